@@ -1,0 +1,183 @@
+"""Into which pieces must a sharp function be cut so that polynomials can stand for it?"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+
+DEGREE = 7
+
+# Pieces before the first look: a resonance shows by its skirt, which must reach a point.
+_FIRST_PIECES = 32
+
+# Relative to the highest speed: a piece this short around a pole is given up. A double resolves
+# 1e-16, so that an interpolant still has seven digits there.
+_SHORTEST = 1e-9
+
+# Probing columns need only betray a resonance, and only while a piece is long enough to hide it.
+_PROBE_TOLERANCE = 1e-2
+_PROBE_SHORTEST = 1e-4
+
+# Channels this much smaller than the largest of their kind are round-off.
+_ROUND_OFF = 1e-11
+
+Solver = Callable[[FloatArray], tuple[ComplexArray, ComplexArray]]
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """
+    Piecewise polynomials of degree `DEGREE`.
+
+    Attributes
+    ----------
+    edges : (k + 1,) float array
+        Ends of the pieces, ascending.
+    resolved : (k,) bool array
+        False where a pole is too close to the real axis.
+    coefficients : (k, DEGREE + 1, p, w) complex array
+        Lowest power first, of the variable that runs from -1 to 1 over a piece.
+
+    """
+
+    edges: FloatArray
+    resolved: BoolArray
+    coefficients: ComplexArray
+
+    @cached_property
+    def _search(self) -> tuple[FloatArray, IntArray]:
+        """Edges of half-open pieces, and what lies below, in, and above them."""
+        # The last piece owns its right end, and a NaN sorts behind everything.
+        edges = np.append(self.edges[:-1], np.nextafter(self.edges[-1], np.inf))
+        pieces = np.where(self.resolved, np.arange(len(self.resolved)), -1)
+        return edges, np.concatenate([[-1], pieces, [-1]])
+
+    def find(self, place: FloatArray) -> IntArray:
+        """Return the index of the resolved piece that holds each place, (n,), or -1."""
+        edges, pieces = self._search
+        return pieces[np.searchsorted(edges, place, side='right')]
+
+
+def evaluate(
+    pieces: Pieces, coefficients: FloatArray, place: FloatArray, index: IntArray,
+) -> FloatArray:
+    """
+    Evaluate piecewise polynomials times the squared place.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Where the pieces lie.
+    coefficients : (k, DEGREE + 1, w) float array
+        Of each piece, lowest power first.
+    place : (n,) float array
+        Inside the edges.
+    index : (n,) int array
+        Piece that holds each place.
+
+    Returns
+    -------
+    (n, w) float array
+        The same to the last bit however many places are evaluated together: products and sums
+        are taken element by element and in one order, unlike those of a matrix product.
+
+    """
+    left, right = pieces.edges[index], pieces.edges[index + 1]
+    powers = np.empty((DEGREE + 1, len(place)))
+    np.multiply(place, place, out=powers[0])
+    powers[1:] = ((place - left) - (right - place)) / (right - left)
+    np.multiply.accumulate(powers, axis=0, out=powers)
+    if len(place) == 1:  # the live node: no sorting, few calls
+        return np.add.reduce(powers * coefficients[index[0]], axis=0, keepdims=True)
+    values = np.empty((len(place), coefficients.shape[2]))
+    for piece, run in _runs(index):
+        values[run] = _sum(powers[:, run, None], coefficients[piece])
+    return values
+
+
+def _sum(powers: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return the sum of powers (d, n, 1) times rows (d, w), (n, w)."""
+    total = powers[0] * rows[0]
+    term = np.empty_like(total)
+    for power, row in zip(powers[1:], rows[1:], strict=True):
+        np.multiply(power, row, out=term)
+        total += term
+    return total
+
+
+def _runs(index: IntArray) -> Iterator[tuple[int, IntArray]]:
+    """Yield each piece once, with the places that lie in it."""
+    order = np.argsort(index, kind='stable')
+    ends = np.flatnonzero(np.diff(index[order], prepend=-1, append=-1))
+    for start, stop in zip(ends[:-1], ends[1:], strict=True):
+        run = order[start:stop]
+        yield int(index[run[0]]), run
+
+
+def refine(
+    solve: Solver, low: float, high: float, *, groups: IntArray, tolerance: float,
+) -> Pieces:
+    """
+    Halve pieces until polynomials through their nodes are right between the nodes.
+
+    Parameters
+    ----------
+    solve : callable
+        From places (n,) to wanted values (n, p, w) and probing values (n, q, w); the latter
+        are not kept but betray resonances that hardly show in the former.
+    low, high : float
+        Ends of the range.
+    groups : (w,) int array
+        Columns of one kind and unit have the same number: the largest of them tells what is
+        round-off in the others.
+    tolerance : float
+        Relative to the local magnitude of each value.
+
+    Returns
+    -------
+    Pieces
+        Of the wanted values.
+
+    """
+    # Every other point of a finer Chebyshev-Lobatto grid carries the polynomial, the rest tests.
+    along = -np.cos(np.pi * np.arange(2 * DEGREE + 1) / (2 * DEGREE))
+    powers = np.linalg.inv(np.vander(along[::2], DEGREE + 1, increasing=True))
+    between = np.vander(along[1::2], DEGREE + 1, increasing=True) @ powers
+    open_edges = np.linspace(low, high, _FIRST_PIECES + 1)
+    left, right = open_edges[:-1], open_edges[1:]
+    done: list[tuple[FloatArray, FloatArray, BoolArray, ComplexArray]] = []
+    while len(left):
+        middle, half = 0.5 * (left + right), 0.5 * (right - left)
+        wanted, probing = (values.reshape(len(left), len(along), *values.shape[1:])
+                           for values in solve((middle[:, None] + half[:, None] * along).ravel()))
+        good = _matches(wanted, between, groups, tolerance)
+        short = right - left <= _SHORTEST * high
+        clear = (_matches(probing, between, groups, _PROBE_TOLERANCE)
+                 | (right - left <= _PROBE_SHORTEST * high))
+        closed = (good & clear) | short
+        coefficients = np.einsum('ij,kj...->ki...', powers, wanted[closed, ::2])
+        done.append((left[closed], right[closed], good[closed], coefficients))
+        left, right = (np.concatenate(ends) for ends in (
+            (left[~closed], middle[~closed]), (middle[~closed], right[~closed])))
+    lefts, rights, resolved, coefficients = (
+        np.concatenate(parts) for parts in zip(*done, strict=True))
+    order = np.argsort(lefts)
+    return Pieces(np.append(lefts[order], rights.max()), resolved[order], coefficients[order])
+
+
+def _matches(
+    values: ComplexArray, between: FloatArray, groups: IntArray, tolerance: float,
+) -> BoolArray:
+    """Return for each piece whether the polynomial meets all values between its nodes."""
+    exact = values[:, 1::2]
+    size = np.abs(exact)
+    largest = np.empty_like(size)
+    for group in np.unique(groups):
+        same = groups == group
+        largest[..., same] = size[..., same].max(axis=-1, keepdims=True)
+    deviation = np.abs(np.einsum('ij,kj...->ki...', between, values[:, ::2]) - exact)
+    return np.asarray(np.all(deviation <= tolerance * size + _ROUND_OFF * largest,
+                             axis=(1, 2, 3)))

@@ -1,0 +1,66 @@
+"""The seed paper's machine, and pieces of it, for the tests."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rotorsoil_ros.physics.cone import ConeModel
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.foundation import Foundation
+from rotorsoil_ros.physics.rotor import Bearing, Disc, Material, Rotor, ShaftSection
+from rotorsoil_ros.physics.soil import DOFS, Rectangle, Soil
+
+SHARED = Path(__file__).resolve().parents[2].parent / 'shared'
+STEEL = Material(2.09e11, 0.3, 7920.0)
+# From I = 7887 mm^4 and 1.9 kg of shaft: the rounded figures of the paper move peaks by 1 %.
+DIAMETER = (64.0 * 7887e-12 / math.pi) ** 0.25
+LENGTH = 1.9 / (STEEL.density * math.pi / 4.0 * DIAMETER**2)
+SOIL = Soil(48e6, 0.25, 1900.0, 0.10)
+CONTACT = Rectangle(0.5, 0.5)
+CONE = ConeModel(SOIL, CONTACT)
+
+
+def bearing(name, position, *, stiffness, damping=0.0, foundation='block'):
+    """Return an isotropic bearing, or one of given 2 x 2 matrices."""
+    return Bearing(name, position, foundation,
+                   stiffness * np.eye(2) if np.ndim(stiffness) == 0 else np.array(stiffness),
+                   damping * np.eye(2) if np.ndim(damping) == 0 else np.array(damping))
+
+
+def uniform_rotor(*, length, diameter, elements, material, discs=(), bearings, height=0.0):
+    """Return a rotor of one cylindrical section."""
+    section = ShaftSection(length, (diameter, diameter), (0.0, 0.0), elements, material)
+    return Rotor(height, (section,), tuple(discs), tuple(bearings))
+
+
+def paper_rotor(*, stiffness=1e9, damping=5e2, elements=28, foundation='block'):
+    """Return the seed paper's rotor in its default geometry."""
+    return uniform_rotor(
+        length=LENGTH, diameter=DIAMETER, elements=elements, material=STEEL, height=0.6,
+        discs=[Disc('disc_1', LENGTH / 4, 0.7, 1e-3, 2e-3),
+               Disc('disc_2', LENGTH, 1.6, 3.2e-3, 6.4e-3)],
+        bearings=[bearing('bearing_1', 0.0, stiffness=stiffness, damping=damping,
+                          foundation=foundation),
+                  bearing('bearing_2', 0.75 * LENGTH, stiffness=stiffness, damping=damping,
+                          foundation=foundation)])
+
+
+def paper_machine(soil_model=CONE, *, mass=42.0, **rotor):
+    """Return the seed paper's machine on one block."""
+    inertia = mass / 12.0
+    block = Foundation('block', CONTACT, 0.375 * LENGTH, mass, 0.0,
+                       (inertia, inertia, 2.0 * inertia))
+    return CoupledModel(paper_rotor(**rotor), (block,), (soil_model,))
+
+
+class Restrained:
+    """A soil that holds all but the named degrees of freedom."""
+
+    def __init__(self, model, *dofs):
+        self.model = model
+        self.free = np.array([1.0 if dof in dofs else 0.0 for dof in DOFS])
+
+    def compliance(self, omega):
+        """Return the compliance with zero rows for what is held."""
+        return self.model.compliance(omega) * self.free[:, None] * self.free
