@@ -1,0 +1,65 @@
+"""Build as an ament_python package (colcon) or as a plain Python package (pip)."""
+
+from glob import glob
+from pathlib import Path
+import re
+
+from setuptools import find_packages, setup
+
+NAME = 'rotorsoil_ros'
+VERSION = re.search(r"__version__ = '(.+)'", Path(NAME, '__init__.py').read_text())[1]
+
+setup(
+    name=NAME,
+    version=VERSION,
+    description='What a rotor on real soil should vibrate like, as a ROS 2 node.',
+    long_description=Path('README.md').read_text() if Path('README.md').exists() else '',
+    long_description_content_type='text/markdown',
+    license='Apache-2.0',
+    maintainer='rotorsoil_ros maintainers',
+    maintainer_email='maintainers@rotorsoil-ros.example',
+    python_requires='>=3.11,<3.14',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    # rotorsoil_ros/config is a link to config: reachable without an ament index, kept once.
+    package_data={NAME: ['py.typed', 'config/*.yaml']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/config', sorted(glob('config/*.yaml'))),
+        (f'share/{NAME}/launch', sorted(glob('launch/*.py'))),
+    ],
+    zip_safe=False,
+    install_requires=[
+        'setuptools',
+        'lz4>=4.0.2',
+        'matplotlib>=3.6',
+        'mcap>=1.2.1',
+        'numpy>=1.26',
+        'pydantic>=2.5',
+        'PyYAML>=6.0.1',
+        'rich>=13.0',
+        'ros-jazzy-common-interfaces>=5.3',
+        'ros-jazzy-rclpy>=7.1',
+        'ros-rclpy[fastrtps]>=7.1',
+        'scikit-fem>=10.0',
+        'scipy>=1.11',
+        'zstandard>=0.20',
+    ],
+    extras_require={
+        'viewer': ['rerun-sdk>=0.23'],
+        'test': [
+            'hypothesis>=6.100',
+            'mypy>=1.10',
+            'pytest>=8.2',
+            'rosbags>=0.11.0',
+            'ruff>=0.6',
+            'types-PyYAML',
+        ],
+    },
+    entry_points={
+        'console_scripts': [
+            f'rotorsoil = {NAME}.cli:main',
+            f'rotorsoil_node = {NAME}.live.node:main',
+        ],
+    },
+)

@@ -1,0 +1,131 @@
+"""The package as colcon and pip see it."""
+
+from importlib.resources import files
+from pathlib import Path
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import pytest
+import setuptools
+
+import rotorsoil_ros
+
+ROOT = Path(__file__).parents[1]
+CASES = sorted((ROOT / 'config').glob('*.yaml'))
+
+# What pip installs, and what package.xml calls it. The wheels of ROS stand for several packages.
+ROS_NAMES = {
+    'PyYAML': {'python3-yaml'}, 'mcap': {'python3-mcap-pip'},
+    'scikit-fem': {'python3-scikit-fem-pip'},
+    'ros-jazzy-rclpy': {'rclpy', 'lifecycle_msgs', 'rcl_interfaces'},
+    'ros-jazzy-common-interfaces': {'sensor_msgs', 'std_msgs', 'diagnostic_msgs'},
+    'ros-rclpy': {'rclpy'}, 'setuptools': set(),
+}
+
+
+@pytest.fixture
+def arguments(monkeypatch):
+    """Return what setup.py hands to setuptools."""
+    caught = {}
+    monkeypatch.setattr(setuptools, 'setup', lambda **given: caught.update(given))
+    monkeypatch.chdir(ROOT)
+    runpy.run_path('setup.py')
+    return caught
+
+
+@pytest.fixture
+def package():
+    return ElementTree.parse(ROOT / 'package.xml').getroot()
+
+
+def test_both_worlds_know_the_same_package(arguments, package):
+    assert package.findtext('name') == arguments['name'] == 'rotorsoil_ros'
+    assert package.findtext('version') == arguments['version'] == rotorsoil_ros.__version__
+    assert package.findtext('license') == arguments['license'] == 'Apache-2.0'
+    assert package.find('export/build_type').text == 'ament_python'
+    maintainer = package.find('maintainer')
+    assert maintainer.get('email') == arguments['maintainer_email']
+    # an address that catkin_pkg refuses would silently drop the ament hooks
+    assert re.fullmatch(r'[-a-zA-Z0-9_%+]+(\.[-a-zA-Z0-9_%+]+)*@[-a-zA-Z0-9%]+(\.[-a-zA-Z0-9%]+)*'
+                        r'\.[a-zA-Z]{2,}', maintainer.get('email'))
+
+
+def test_every_dependency_is_named_in_both_worlds(arguments, package):
+    wanted = set()
+    for requirement in arguments['install_requires']:
+        name = re.match(r'[\w-]+', requirement)[0]
+        assert name == 'setuptools' or '>=' in requirement
+        wanted |= ROS_NAMES.get(name, {f'python3-{name}'})
+    named = {node.text for node in package.findall('exec_depend')}
+    assert named - {'launch', 'launch_ros'} == wanted  # these two are not on the package index
+
+
+def test_entry_points_can_be_called(arguments):
+    for entry in arguments['entry_points']['console_scripts']:
+        _, target = entry.split(' = ')
+        module, function = target.split(':')
+        path = ROOT / Path(*module.split('.'))
+        source = path.with_suffix('.py') if path.with_suffix('.py').exists() else (
+            path / '__init__.py')
+        assert f'def {function}(' in source.read_text()
+
+
+def test_data_files_exist_and_hold_every_case(arguments):
+    installed = dict(arguments['data_files'])
+    assert installed['share/ament_index/resource_index/packages'] == ['resource/rotorsoil_ros']
+    assert installed['share/rotorsoil_ros'] == ['package.xml']
+    assert [Path(name).name for name in installed['share/rotorsoil_ros/config']] == [
+        path.name for path in CASES]
+    assert installed['share/rotorsoil_ros/launch']
+    for sources in installed.values():
+        assert all((ROOT / source).is_file() for source in sources)
+
+
+def test_scripts_go_where_ros_looks_for_them():
+    text = (ROOT / 'setup.cfg').read_text()
+    assert text.count('=$base/lib/rotorsoil_ros') == 2
+
+
+@pytest.mark.parametrize('path', CASES, ids=lambda path: path.stem)
+def test_case_opens_with_its_story_and_has_a_test_of_its_name(path):
+    text = path.read_text()
+    assert text.startswith('# ')
+    assert re.search(rf'^name: {path.stem}$', text, re.MULTILINE)
+    assert (ROOT / 'test' / 'case' / f'test_{path.stem}.py').exists()
+
+
+@pytest.mark.parametrize('path', CASES, ids=lambda path: path.stem)
+def test_case_is_a_resource_of_the_package(path):
+    assert (files('rotorsoil_ros') / 'config' / path.name).read_text() == path.read_text()
+
+
+def test_build_holds_cases_and_types(tmp_path):
+    source = tmp_path / 'source'
+    shutil.copytree(ROOT, source, symlinks=True, ignore=shutil.ignore_patterns(
+        '.*', 'build', 'install', 'log', '__pycache__', '*.egg-info', 'demo_output'))
+    target = tmp_path / 'built'
+    subprocess.run([sys.executable, 'setup.py', '--quiet', 'build_py', '--build-lib', str(target)],
+                   cwd=source, check=True, capture_output=True)
+    package = target / 'rotorsoil_ros'
+    assert (package / 'py.typed').is_file()
+    assert sorted(path.name for path in (package / 'config').iterdir()) == [
+        path.name for path in CASES]
+    assert {path.relative_to(package) for path in package.rglob('*.py')} == {
+        path.relative_to(ROOT / 'rotorsoil_ros')
+        for path in (ROOT / 'rotorsoil_ros').rglob('*.py')}
+
+
+def test_launch_file_is_python():
+    for path in (ROOT / 'launch').glob('*.py'):
+        compile(path.read_text(), str(path), 'exec')
+        assert 'def generate_launch_description(' in path.read_text()
+
+
+def test_changelog_is_one_for_this_package():
+    lines = (ROOT / 'CHANGELOG.rst').read_text().splitlines()
+    assert lines[1] == 'Changelog for package rotorsoil_ros'
+    assert len(lines[0]) == len(lines[2]) == len(lines[1])
