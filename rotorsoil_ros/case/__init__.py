@@ -1,0 +1,1 @@
+"""Files: the case in YAML, the cache of tables, the pictures."""

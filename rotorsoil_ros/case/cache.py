@@ -1,0 +1,176 @@
+"""Where tables wait for the next start, and how one knows that they are the right ones."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, is_dataclass, replace
+import hashlib
+import json
+import logging
+import os
+from pathlib import Path
+import tempfile
+from typing import Any
+import zipfile
+import zlib
+
+import numpy as np
+
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.physics.response import ResponseTable, TOLERANCE
+
+# To be raised whenever the physics gives other numbers for the same case: old tables must go.
+ALGORITHM = 1
+
+_KEY = '__key__'
+_LOG = logging.getLogger(__name__)
+
+# What reading a damaged or foreign .npz raises.
+_UNREADABLE = (OSError, EOFError, KeyError, ValueError, TypeError, MemoryError, RuntimeError,
+               zipfile.BadZipFile, zlib.error)
+
+
+def directory(chosen: Path | None = None) -> Path:
+    """Return the directory of the cache: the chosen one, $ROTORSOIL_CACHE, or the user's."""
+    if chosen is not None:
+        return chosen
+    if os.environ.get('ROTORSOIL_CACHE'):
+        return Path(os.environ['ROTORSOIL_CACHE'])
+    if os.environ.get('XDG_CACHE_HOME'):
+        return Path(os.environ['XDG_CACHE_HOME']) / 'rotorsoil'
+    return Path.home() / '.cache' / 'rotorsoil'
+
+
+def content_key(*parts: object) -> str:
+    """
+    Return what identifies a computation: the same for equal content, in every process.
+
+    Parameters
+    ----------
+    parts
+        Numbers, strings, arrays, dataclasses and sequences of them that determine the result.
+
+    Returns
+    -------
+    str
+        SHA-256 of their canonical form, in hexadecimal digits.
+
+    """
+    canonical = json.dumps([ALGORITHM, *parts], default=_plain, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def _plain(value: Any) -> object:
+    if is_dataclass(value) and not isinstance(value, type):
+        named = {field.name: getattr(value, field.name) for field in fields(value)}
+        return [type(value).__name__, named]
+    if isinstance(value, np.ndarray):
+        parts = value.view(float) if np.iscomplexobj(value) else value
+        return [str(value.dtype), parts.tolist()]
+    raise TypeError(f'{type(value).__name__} cannot be part of a key')
+
+
+def _label(key: str, arrays: Iterable[str]) -> str:
+    # The names too: damage to a zip's directory can lose an array without a checksum failing.
+    return ' '.join([key, *sorted(arrays)])
+
+
+@dataclass(frozen=True)
+class Cache:
+    """
+    Arrays in files of a directory, each under the key of what determined it.
+
+    A file that is not what it should be, and a directory that cannot be written, are logged
+    as warnings: the caller computes again, and nothing wrong is ever returned.
+
+    Attributes
+    ----------
+    directory : Path
+        Where the files lie; it comes into being with the first of them.
+
+    """
+
+    directory: Path
+
+    def path(self, kind: str, key: str) -> Path:
+        """Return the file that holds, or would hold, the arrays of a key."""
+        return self.directory / f'{kind}_{key}.npz'
+
+    def load(self, kind: str, key: str) -> dict[str, np.ndarray] | None:
+        """Return the arrays stored under a key, or None if they have to be computed."""
+        path = self.path(kind, key)
+        try:
+            with path.open('rb') as stream, np.load(stream, allow_pickle=False) as stored:
+                arrays = dict(stored)
+                found = str(arrays.pop(_KEY))
+        except FileNotFoundError:
+            return None
+        except _UNREADABLE as error:
+            _LOG.warning('%s cannot be read and is computed again: %s', path, error)
+            return None
+        if found != _label(key, arrays):
+            _LOG.warning('%s holds something else and is computed again: %s', path, found[:64])
+            return None
+        return arrays
+
+    def store(self, kind: str, key: str, arrays: dict[str, np.ndarray]) -> None:
+        """Store arrays under a key; a reader sees the whole file or none."""
+        if any(array.dtype.hasobject for array in arrays.values()):
+            raise TypeError('an array of objects would be pickled')
+        path = self.path(kind, key)
+        partial = None
+        try:
+            self.directory.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(
+                    dir=self.directory, prefix='.partial_', delete=False) as stream:
+                partial = stream.name
+                labelled: dict[str, Any] = {_KEY: np.array(_label(key, arrays)), **arrays}
+                np.savez(stream, **labelled)
+            os.replace(partial, path)
+        except OSError as error:
+            _LOG.warning('%s cannot be written: %s', path, error)
+            if partial is not None:
+                Path(partial).unlink(missing_ok=True)
+
+
+def response_key(case: Case) -> str:
+    """Return what identifies the response table of a case: all of it but its unbalance."""
+    models = case.soil_models()
+    return content_key('response', TOLERANCE, case.rotor, case.foundations, models,
+                       case.speed_range)
+
+
+def stored_response_table(case: Case, cache: Path) -> ResponseTable | None:
+    """Return the response table of a case if the cache holds it."""
+    key = response_key(case)
+    arrays = Cache(cache).load('response', key)
+    return None if arrays is None else ResponseTable.from_arrays(arrays, key=key)
+
+
+def response_table(case: Case, cache: Path) -> ResponseTable:
+    """
+    Return the response table of a case, computed and stored if the cache does not hold it.
+
+    Parameters
+    ----------
+    case : Case
+        The machine.
+    cache : Path
+        Directory of the cache.
+
+    Returns
+    -------
+    ResponseTable
+        With its key.
+
+    Raises
+    ------
+    RotorSoilError
+        If the case cannot be solved.
+
+    """
+    stored = stored_response_table(case, cache)
+    if stored is not None:
+        return stored
+    key = response_key(case)
+    table = replace(ResponseTable.build(case.coupled_model(), case.speed_range), key=key)
+    Cache(cache).store('response', key, table.to_arrays())
+    return table

@@ -1,0 +1,227 @@
+"""What a YAML file says, read as if nobody could be trusted to have written it well."""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+import re
+from typing import Any
+
+import yaml
+
+from rotorsoil_ros.physics.errors import InputError
+
+# A long case with bearing tables has a few thousand nodes in 50 kB; parsing takes 1 s per 250 kB.
+_LARGEST_BYTES = 256 * 1024
+_LARGEST_DEPTH = 24
+_LARGEST_NODES = 50_000
+_LARGEST_SHOWN = 64
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe loader with the scalars of YAML 1.2: 1e9 is a number, `on` and 1:30 are strings."""
+
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - so declared by PyYAML
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        """Construct a mapping, refusing a key that is no word or stands there twice."""
+        seen = set()
+        for key, _ in node.value:
+            problem = None
+            if not isinstance(key, yaml.ScalarNode):
+                problem = 'a key must be a word'
+            elif key.value in seen:
+                problem = f'the key {key.value} stands here twice'
+            if problem is not None:
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+            seen.add(key.value)
+        return super().construct_mapping(node, deep=deep)
+
+    def construct_number(self, node: yaml.ScalarNode) -> int | float:
+        """Construct an int where it is one and short, a float elsewhere."""
+        text = str(node.value)
+        if len(text) < 16 and re.fullmatch(r'[-+]?[0-9]+', text):
+            return int(text)
+        return float(text.lower().replace('.inf', 'inf').replace('.nan', 'nan'))
+
+
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:float',
+    re.compile(r'[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$'
+               r'|[-+]?\.(inf|Inf|INF)$|\.(nan|NaN|NAN)$'),
+    list('-+.0123456789'))
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:bool', re.compile(r'(true|True|TRUE|false|False|FALSE)$'), list('tTfF'))
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:null', re.compile(r'(~|null|Null|NULL|)$'), ['~', 'n', 'N', ''])
+_Loader.add_implicit_resolver('tag:yaml.org,2002:merge', re.compile(r'<<$'), ['<'])
+_Loader.add_constructor('tag:yaml.org,2002:float', _Loader.construct_number)
+
+
+def shown(value: object) -> str:
+    """Return a value as an error message shows it: one line, not endless."""
+    text = repr(value)
+    return text if len(text) <= _LARGEST_SHOWN else f'{text[:_LARGEST_SHOWN]}...'
+
+
+def read(path: Path) -> dict[str, Any]:
+    """
+    Read a YAML file that holds one mapping.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        What it says, in plain Python values.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not YAML, is too large, too deep, refers to itself or
+        says a key twice.
+
+    """
+    try:
+        with path.open('rb') as stream:
+            content = stream.read(_LARGEST_BYTES + 1)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be read: {error.strerror}') from error
+    if len(content) > _LARGEST_BYTES:
+        raise InputError(f'{path}: is larger than {_LARGEST_BYTES // 1024} KiB: no case file')
+    try:
+        text = content.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') from error
+    document = parse(text, source=str(path))
+    if not isinstance(document, dict):
+        raise InputError(f'{path}: must hold keys and values, got {shown(document)}')
+    return document
+
+
+def parse(text: str, *, source: str) -> Any:
+    """Return what a YAML text says; an InputError names the source and the line."""
+    try:
+        _refuse_excess(text)
+        return _tree(yaml.load(text, _Loader))
+    except yaml.YAMLError as error:
+        raise InputError(f'{source}: {_one_line(error)}') from error
+
+
+def _tree(value: Any) -> Any:
+    """Copy what an alias repeats, so that an override of one place leaves the other alone."""
+    if isinstance(value, dict):
+        return {key: _tree(entry) for key, entry in value.items()}
+    return [_tree(entry) for entry in value] if isinstance(value, list) else value
+
+
+def _refuse_excess(text: str) -> None:
+    """Walk over the events, before anything is built, and refuse what would grow without end."""
+    growth = _Growth()
+    for event in yaml.parse(text, _Loader):
+        problem = growth.add(event)
+        if problem is not None:
+            mark = event.start_mark
+            raise yaml.MarkedYAMLError(
+                problem=problem, problem_mark=mark if isinstance(mark, yaml.Mark) else None)
+
+
+@dataclass
+class _Growth:
+    """What a stream of events builds: values, repeated ones counted, and open collections."""
+
+    count: int = 0
+    size_of_anchor: dict[str | None, int] = field(default_factory=dict)
+    open_nodes: list[tuple[str | None, int]] = field(default_factory=list)
+
+    def add(self, event: yaml.Event) -> str | None:
+        """Take an event in and return what is wrong with it."""
+        if isinstance(event, yaml.AliasEvent):
+            self.count += self.size_of_anchor.get(event.anchor, 1)
+            # An anchor still open is not in the dictionary: the alias would hold itself.
+            if event.anchor not in self.size_of_anchor:
+                return f'the alias *{event.anchor} repeats nothing that ends before it'
+        elif isinstance(event, (yaml.ScalarEvent, yaml.CollectionStartEvent)):
+            self.count += 1
+            if event.tag is not None:
+                return 'tags (!) are not allowed'
+            if isinstance(event, yaml.ScalarEvent):
+                self.size_of_anchor[event.anchor] = 1
+            else:
+                self.open_nodes.append((event.anchor, self.count))
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, start = self.open_nodes.pop()
+            self.size_of_anchor[anchor] = self.count - start + 1
+        if len(self.open_nodes) > _LARGEST_DEPTH:
+            return f'nested deeper than {_LARGEST_DEPTH} levels'
+        if self.count > _LARGEST_NODES:
+            return f'more than {_LARGEST_NODES} values, repeated ones counted'
+        return None
+
+
+def _one_line(error: yaml.YAMLError) -> str:
+    """Return what is wrong with a YAML text, with its place, in one line."""
+    if isinstance(error, yaml.MarkedYAMLError):
+        problem = ' '.join(' '.join(filter(None, (error.context, error.problem))).split())
+        mark = error.problem_mark or error.context_mark
+        return problem if mark is None else f'line {mark.line + 1}: {problem}'
+    return ' '.join(str(error).split())
+
+
+def override(document: dict[str, Any], overrides: Sequence[str]) -> None:
+    """
+    Apply `key.path=value` settings to a document, in place and in order.
+
+    Parameters
+    ----------
+    document : dict
+        As `read` returns it.
+    overrides : sequence of str
+        Keys of mappings and indices of lists, joined by dots; the value is YAML.
+
+    Raises
+    ------
+    InputError
+        If a setting has no `=`, or its path leads through something that is not there.
+
+    """
+    for setting in overrides:
+        path, equals, value = setting.partition('=')
+        source = f'--set {shown(setting)[1:-1]}'
+        if not equals or not all(path.split('.')):
+            raise InputError(f'{source}: must be key.path=value')
+        *parents, last = path.split('.')
+        place: Any = document
+        for depth, step in enumerate(parents):
+            known = '.'.join(parents[:depth]) or 'the case'
+            place = _enter(place, step, known=known, source=source)
+        _assign(place, last, parse(value, source=source), source=source,
+                known='.'.join(parents) or 'the case')
+
+
+def _enter(place: Any, step: str, *, known: str, source: str) -> Any:
+    """Return what lies one step further down; a missing mapping begins empty."""
+    if isinstance(place, dict):
+        if place.get(step) is None:
+            place[step] = {}
+        return place[step]
+    return place[_index(place, step, known=known, source=source)]
+
+
+def _assign(place: Any, step: str, value: Any, *, known: str, source: str) -> None:
+    if isinstance(place, dict):
+        place[step] = value
+    else:
+        place[_index(place, step, known=known, source=source)] = value
+
+
+def _index(place: Any, step: str, *, known: str, source: str) -> int:
+    """Return the index of an entry of a list, which has to be there."""
+    if not isinstance(place, list):
+        raise InputError(f'{source}: {known} has no keys below it, it is {shown(place)}')
+    if not (step.isascii() and step.isdigit() and len(step) < 10 and int(step) < len(place)):
+        raise InputError(f'{source}: {known} has {len(place)} entries, counted from 0, and no '
+                         f'entry {step}')
+    return int(step)

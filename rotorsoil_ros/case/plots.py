@@ -1,0 +1,228 @@
+"""What a case answers, as figures for print: every axis has its unit."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.drawing import machine_drawing
+from rotorsoil_ros.case.peaks import Peak, resolved_speeds, resonances
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.response import Predictor, ResponseTable
+from rotorsoil_ros.physics.rotor import Probe
+from rotorsoil_ros.physics.soil import DOFS
+from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
+
+# Okabe and Ito: told apart by every eye, and in grey.
+COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#56b4e9', '#e69f00')
+
+_MICRO = 1e6
+_SMALLEST_DRAWN = 1e-15
+_LOWEST_TREND = 1e-4  # [um]; below it no instrument sees anything
+_LARGEST_DRAWN_PEAKS = 4
+_LARGEST_DRAWN_NODES = 120
+# Not the whole turn: the gap before the dot shows the sense of an orbit.
+_TURN = np.linspace(0.0, 1.86 * np.pi, 181)
+
+
+def all_figures(case: Case, table: ResponseTable) -> Iterator[tuple[str, Figure]]:
+    """Yield name and figure of every picture of a case."""
+    predictor = table.predictor(case.unbalance)
+    yield 'machine', machine_drawing(case)
+    if case.support.model != 'rigid':
+        yield 'support', support(case)
+    for kind, channels in channel_groups(case).items():
+        yield f'bode_{kind}', bode(predictor, channels, f'{case.name}: {kind}')
+    peaks = main_peaks(case, predictor)
+    if peaks:
+        yield 'orbits', orbits(case, predictor, peaks)
+        yield 'shapes', shapes(case, peaks)
+
+
+def main_peaks(case: Case, predictor: Predictor) -> list[Peak]:
+    """Return the largest peaks of the machine's displacements, slowest first."""
+    moved = [name for kind, names in channel_groups(case).items() if kind != 'rocking'
+             for name in names]
+    peaks = sorted(resonances(predictor, tuple(moved)), key=lambda peak: -peak.amplitude)
+    return sorted(peaks[:_LARGEST_DRAWN_PEAKS], key=lambda peak: peak.speed)
+
+
+def channel_groups(case: Case) -> dict[str, list[str]]:
+    """Return the channels that belong in one diagram, by what they are of."""
+    rotor = case.rotor
+    groups = {
+        'journals': [f'{bearing.name}_journal_{axis}' for bearing in rotor.bearings
+                     for axis in 'xz'],
+        'housings': [f'{bearing.name}_housing_{axis}' for bearing in rotor.bearings
+                     for axis in 'xz' if case.support.model != 'rigid'],
+        'discs': [f'{disc.name}_{axis}' for disc in rotor.discs for axis in 'xz'],
+        'probes': [f'{probe.name}_{axis}' for probe in rotor.probes for axis in 'xz'],
+    }
+    if case.support.model != 'rigid':
+        names = [block.name for block in case.foundations]
+        groups['foundations'] = [f'{name}_{dof}' for name in names for dof in DOFS[:3]]
+        groups['rocking'] = [f'{name}_{dof}' for name in names for dof in DOFS[3:]]
+    return {kind: names for kind, names in groups.items() if names}
+
+
+def support(case: Case) -> Figure:
+    """Draw what the soil under every block opposes to one force or moment, over frequency."""
+    omega = np.linspace(0.0, case.speed_range[1], 400)
+    figure = Figure(figsize=(7.5, 7.5), layout='constrained')
+    grid = figure.subplots(3, 2, sharex=True)
+    for block, model in zip(case.foundations, case.soil_models(), strict=True):
+        diagonal = np.diagonal(model.compliance(omega), axis1=1, axis2=2)
+        for dof in np.flatnonzero(np.all(diagonal != 0.0, axis=0)):
+            column = grid[:, dof // 3]
+            style: dict[str, Any] = {
+                'color': COLOURS[dof % 3], 'linestyle': ('-', '--', '-.')[dof % 3],
+                'label': f'{block.name} {DOFS[dof]}'}
+            felt = 1.0 / diagonal[:, dof]
+            for axes, values in zip(
+                    column, (felt.real, felt.imag, np.abs(diagonal[:, dof])), strict=True):
+                axes.plot(rad_s_to_hz(omega), values, **style)
+    for column, stiffness, compliance in zip(
+            grid.T, ('N/m', 'N m/rad'), ('m/N', 'rad/(N m)'), strict=True):
+        column[0].set_ylabel(f'Re 1/N, spring [{stiffness}]')
+        column[1].set_ylabel(f'Im 1/N, damping [{stiffness}]')
+        column[2].set(ylabel=f'compliance |N| [{compliance}]', xlabel='frequency [Hz]')
+        column[0].legend(fontsize=7)
+    for axes in grid.flat:
+        _tidy(axes)
+    figure.suptitle(f'{case.name}: soil below the massless contact, one direction at a time',
+                    fontsize=10)
+    return figure
+
+
+def bode(predictor: Predictor, channels: Sequence[str], title: str) -> Figure:
+    """Draw amplitude, zero-to-peak, and phase of channels of one unit over the speed."""
+    turns = channels[0].rpartition('_')[2] in DOFS[3:]
+    speed = resolved_speeds(predictor)
+    response = predictor.predict(speed).displacement
+    figure = Figure(figsize=(7.5, 5.2), layout='constrained')
+    amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    for number, channel in enumerate(channels):
+        values = response[:, predictor.channels.index(channel)]
+        moving = np.abs(values) > _SMALLEST_DRAWN
+        if not np.any(moving):
+            continue
+        style = {'color': COLOURS[number // 2 % len(COLOURS)], 'linewidth': 1.2,
+                 'linestyle': ('-', '--')[number % 2], 'label': channel}
+        x = rad_s_to_rpm(speed[moving])
+        amplitude.semilogy(x, _MICRO * np.abs(values[moving]), **style)
+        phase.plot(x, _without_jumps(np.rad2deg(np.angle(values[moving]))), **style)
+    amplitude.set_ylabel(f'amplitude, zero-to-peak [{"urad" if turns else "um"}]')
+    phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
+              yticks=range(-180, 181, 90))
+    if amplitude.get_lines():
+        amplitude.legend(fontsize=7, ncols=2)
+    _tidy(amplitude)
+    _tidy(phase)
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _without_jumps(degrees: FloatArray) -> FloatArray:
+    """Break a line where its phase passes from one end of the scale to the other."""
+    jump = np.abs(np.diff(degrees, prepend=degrees[0])) > 300.0
+    return np.where(jump, np.nan, degrees)
+
+
+def orbits(case: Case, predictor: Predictor, peaks: Sequence[Peak]) -> Figure:
+    """Draw the orbit of every station at some speeds, a row for each."""
+    rotor = case.rotor
+    stations = [*(f'{bearing.name}_journal' for bearing in rotor.bearings),
+                *(disc.name for disc in rotor.discs), *(probe.name for probe in rotor.probes)]
+    figure = Figure(figsize=(1.9 * len(stations) + 0.6, 2.1 * len(peaks) + 0.5),
+                    layout='constrained')
+    grid = figure.subplots(len(peaks), len(stations), squeeze=False)
+    for peak, row in zip(peaks, grid, strict=True):
+        motion = predictor.predict(np.array([peak.speed])).displacement[0]
+        for name, axes in zip(stations, row, strict=True):
+            x, z = (_over_a_turn(motion[predictor.channels.index(f'{name}_{axis}')])
+                    for axis in 'xz')
+            axes.plot(x, z, color=COLOURS[0])
+            axes.plot(x[0], z[0], 'o', color=COLOURS[1], markersize=4)
+            axes.set_aspect('equal', adjustable='datalim')
+            axes.tick_params(labelsize=6)
+            axes.locator_params(nbins=4)
+            axes.grid(alpha=0.3)
+        row[0].set_ylabel(f'{rad_s_to_rpm(peak.speed):.0f} rpm\nz [um]', fontsize=8)
+    for name, top, bottom in zip(stations, grid[0], grid[-1], strict=True):
+        top.set_title(name, fontsize=8)
+        bottom.set_xlabel('x [um]', fontsize=8)
+    figure.suptitle(f'{case.name}: orbits at the peaks, from the dot (t = 0) on', fontsize=10)
+    return figure
+
+
+def _over_a_turn(amplitude: complex) -> FloatArray:
+    return np.asarray(_MICRO * np.real(amplitude * np.exp(1j * _TURN)))
+
+
+def shapes(case: Case, peaks: Sequence[Peak]) -> Figure:
+    """Draw the deflected shaft at some speeds, solved at the nodes of the mesh."""
+    nodes = case.rotor.node_positions
+    nodes = nodes[::1 + len(nodes) // _LARGEST_DRAWN_NODES]
+    probes = tuple(Probe(f'node_{number}', place) for number, place in enumerate(nodes))
+    everywhere = replace(case, rotor=replace(case.rotor, probes=probes)).coupled_model()
+    first = everywhere.channels.index('node_0_x')
+    speed = np.array([peak.speed for peak in peaks])
+    motion = everywhere.unbalance_response(speed, case.unbalance).displacement
+    motion = motion[:, first:first + 2 * len(nodes)].reshape(len(peaks), -1, 2)
+    figure = Figure(figsize=(7.5, 1.7 * len(peaks) + 0.7), layout='constrained')
+    rows = figure.subplots(len(peaks), 1, sharex=True, squeeze=False)[:, 0]
+    for peak, shape, axes in zip(peaks, motion, rows, strict=True):
+        _draw_shape(axes, case, nodes, shape)
+        axes.set_ylabel(f'{rad_s_to_rpm(peak.speed):.0f} rpm\n[um]', fontsize=8)
+    rows[0].legend(fontsize=7, ncols=2)
+    rows[-1].set_xlabel('y along the shaft [m]')
+    figure.suptitle(f'{case.name}: shaft at the peaks, when it is bent most', fontsize=10)
+    return figure
+
+
+def _draw_shape(axes: Axes, case: Case, nodes: FloatArray, shape: ComplexArray) -> None:
+    largest = shape.flat[np.abs(shape).argmax()]
+    at_its_most = _MICRO * np.real(shape * np.exp(-1j * np.angle(largest)))
+    for column, axis in enumerate('xz'):
+        axes.plot(nodes, at_its_most[:, column], color=COLOURS[column],
+                  label=f'{axis} of the shaft')
+    for bearing in case.rotor.bearings:
+        axes.axvline(bearing.position, color='grey', linestyle=':', linewidth=0.8)
+    for disc in case.rotor.discs:
+        axes.axvline(disc.position, color='#d9a441', linewidth=1.5, alpha=0.6)
+    axes.axhline(0.0, color='black', linewidth=0.5)
+    _tidy(axes)
+
+
+def trend(
+    time_s: FloatArray, speed: FloatArray, amplitude: FloatArray, *, channels: Sequence[str],
+    title: str,
+) -> Figure:
+    """Draw speed (n,) [rad/s] and amplitudes (n, c) [m] of all that is not a rotation."""
+    figure = Figure(figsize=(7.5, 6.0), layout='constrained')
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 2.5])
+    top.plot(time_s, rad_s_to_rpm(speed), color='black')
+    top.set_ylabel('speed [rpm]')
+    moved = [index for index, name in enumerate(channels)
+             if name.rpartition('_')[2] in 'xz' and '_journal_' not in name]
+    for number, index in enumerate(moved):
+        bottom.semilogy(time_s, _MICRO * np.maximum(amplitude[:, index], _SMALLEST_DRAWN),
+                        color=COLOURS[number // 2 % len(COLOURS)], linewidth=1.0,
+                        linestyle=('-', '--')[number % 2], label=channels[index])
+    bottom.set(xlabel='time [s]', ylabel='amplitude, zero-to-peak [um]')
+    bottom.set_ylim(bottom=_LOWEST_TREND)
+    bottom.legend(fontsize=7, ncols=5, loc='upper center', bbox_to_anchor=(0.5, -0.14))
+    _tidy(top)
+    _tidy(bottom)
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _tidy(axes: Axes) -> None:
+    axes.grid(alpha=0.3)
+    axes.tick_params(labelsize=8)
+    axes.margins(x=0.01)

@@ -1,0 +1,90 @@
+"""What can be said of a case before anything runs: derived quantities, and what looks odd."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.physics.foundation import Foundation
+from rotorsoil_ros.physics.soil import DOFS, equivalent_radii, Rectangle, Soil, SoilModel
+from rotorsoil_ros.physics.units import rad_s_to_rpm
+
+# What the design note measured of cones against rigorous solutions (soil_and_foundation.md, 1.2
+# and 1.3): beyond these they are off by more than a quarter.
+_LARGEST_A0 = 6.0
+_LARGEST_A0_INCOMPRESSIBLE = 2.0
+_LARGEST_ASPECT = 2.0
+
+
+def derived_quantities(case: Case) -> Iterator[tuple[str, str]]:
+    """Yield names and values, with units, of what follows from a case."""
+    low, high = case.speed_range
+    yield 'case', f'{case.name} ({case.path})'
+    yield 'speed range', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm'
+    yield 'rotor mass', f'{case.rotor.mass:.4g} kg'
+    yield 'mesh', f'{len(case.rotor.node_positions)} nodes on {case.rotor.length:g} m of shaft'
+    for disc, value in zip(case.rotor.discs, case.unbalance, strict=True):
+        yield f'unbalance of {disc.name}', (
+            f'{abs(value):g} kg m at {np.angle(value):g} rad')
+    yield 'support model', case.support.model
+    if case.soil is not None:
+        yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
+        yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
+    for foundation, model in zip(case.foundations, case.soil_models(), strict=True):
+        yield from _of_foundation(case, foundation, model)
+
+
+def _of_foundation(
+    case: Case, foundation: Foundation, model: SoilModel,
+) -> Iterator[tuple[str, str]]:
+    name = foundation.name
+    yield f'{name}: mass over rotor mass', f'{foundation.mass / case.rotor.mass:.4g}'
+    if case.soil is not None:
+        radius = equivalent_radii(foundation.contact)[2]
+        yield f'{name}: mass ratio m / (rho r0^3)', (
+            f'{foundation.mass / (case.soil.density * radius**3):.4g}')
+        low, high = (a0(case.soil, foundation, speed) for speed in case.speed_range)
+        yield f'{name}: a0', f'{low:.3g} to {high:.3g}'
+    static = np.diagonal(model.compliance(np.zeros(1))[0])
+    for dof, compliance in zip(DOFS, static, strict=True):
+        unit = 'N/m' if len(dof) == 1 else 'N m/rad'
+        stiffness = 'rigid' if compliance == 0.0 else f'{(1.0 / compliance).real:.4g} {unit}'
+        yield f'{name}: static stiffness {dof}', stiffness
+
+
+def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
+    """Return the dimensionless frequency of a block, omega b / c_s or omega r0 / c_s."""
+    return omega * foundation.contact.characteristic_length / soil.shear_wave_speed
+
+
+def warnings(case: Case) -> Iterator[str]:
+    """Yield what is allowed but looks like a slip, or lies where a model is poor."""
+    if not np.any(case.unbalance):
+        yield 'unbalances: none, every prediction will be zero'
+    for disc in case.rotor.discs:
+        if disc.polar_inertia > 2.0 * disc.diametral_inertia:
+            yield (f'{disc.name}: polar inertia {disc.polar_inertia:g} kg m^2 is more than twice '
+                   f'the diametral {disc.diametral_inertia:g} kg m^2, which no body has')
+    for foundation in case.foundations:
+        small, medium, large = sorted(foundation.inertia)
+        if large > (1.0 + 1e-9) * (small + medium):
+            yield (f'{foundation.name}: inertia {large:g} kg m^2 about one axis is more than '
+                   'that about both others, which no body has')
+        if case.soil is not None and case.support.model == 'cone':
+            yield from _of_cones(case.soil, foundation, highest_omega=case.speed_range[1])
+
+
+def _of_cones(soil: Soil, foundation: Foundation, *, highest_omega: float) -> Iterator[str]:
+    highest = a0(soil, foundation, highest_omega)
+    limit = _LARGEST_A0
+    if soil.poisson_ratio > 1.0 / 3.0:
+        limit = _LARGEST_A0_INCOMPRESSIBLE
+    if highest > limit:
+        yield (f'{foundation.name}: a0 reaches {highest:.3g}; above {limit:g} cones are off by '
+               'more than a quarter for this soil')
+    if isinstance(foundation.contact, Rectangle):
+        sides = foundation.contact.half_width, foundation.contact.half_length
+        aspect = max(sides) / min(sides)
+        if aspect > _LARGEST_ASPECT:
+            yield (f'{foundation.name}: contact is {aspect:.3g} times as long as wide; above '
+                   f'{_LARGEST_ASPECT:g} discs of equal area are off by more than 10 %')

@@ -1,0 +1,58 @@
+"""The verbs of `rotorsoil`: what each needs is imported only when it is called."""
+
+from collections.abc import Sequence
+from importlib import import_module
+import logging
+import os
+import sys
+import warnings
+
+from rotorsoil_ros.cli.parser import parser
+from rotorsoil_ros.physics.errors import InputError, RotorSoilError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run one verb.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 a verdict that fails, 2 bad input.
+
+    """
+    logging.basicConfig(format='%(message)s', level=logging.WARNING)
+    arguments = parser().parse_args(argv)
+    module, function = arguments.run.split(':')
+    try:
+        with warnings.catch_warnings():
+            # An overflow ends in an error of one line; numpy's remarks would bury it.
+            warnings.simplefilter('ignore', RuntimeWarning)
+            verb = getattr(import_module(f'rotorsoil_ros.cli.{module}'), function)
+            status = int(verb(arguments))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader has seen enough; Python would complain once more while closing the stream.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return BAD_INPUT
+    except RotorSoilError as error:
+        # The physics does not know which file it came from.
+        print(*filter(None, (getattr(arguments, 'case', None), error)), sep=': ', file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        print(f'{error.filename or "standard output"}: {error.strerror}', file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return status

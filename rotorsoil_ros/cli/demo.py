@@ -1,0 +1,171 @@
+"""The main job for real: a node process and a replay process talk DDS on this host."""
+
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from rotorsoil_ros.case import cache
+from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.plots import all_figures, trend
+from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.live import bag_reader
+from rotorsoil_ros.live.events import NANOSECONDS
+from rotorsoil_ros.live.profile import write_speed_profile
+from rotorsoil_ros.physics.arrays import FloatArray, IntArray
+from rotorsoil_ros.physics.errors import RotorSoilError
+from rotorsoil_ros.physics.response import ResponseTable
+from rotorsoil_ros.physics.units import rad_s_to_rpm, rpm_to_rad_s
+
+MACHINE = 'paper_rotor'
+
+# Run up through both pairs of critical speeds, dwell, coast down against a viscous drag.
+_RUN_UP_S, _DWELL_S, _COAST_S, _RATE_HZ = 12.0, 3.0, 9.0, 100
+_SLOWEST_RPM, _FASTEST_RPM = 300.0, 8400.0
+_START_NS = 1_767_225_600 * NANOSECONDS  # 2026-01-01: the same files whenever it runs
+
+_SHUTDOWN_S = 5.0
+_ONE_DOMAIN_OF = 100
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """What the log holds: stamps (n,) [ns], speeds (n,) [rad/s], amplitudes (n, c) [m, rad]."""
+
+    stamp_ns: IntArray
+    speed: FloatArray
+    channels: tuple[str, ...]
+    amplitude: FloatArray
+
+
+def demo(arguments: Namespace) -> int:
+    """Run up, dwell and coast down a machine before a live node; leave log and pictures."""
+    out: Path = arguments.output
+    out.mkdir(parents=True, exist_ok=True)
+    # Tables of the demo are its own: what it shows was computed here.
+    directory = out / 'cache'
+    with as_file(files('rotorsoil_ros') / 'config' / f'{MACHINE}.yaml') as path:
+        case = load(path)
+        with progress('solving for every speed') as _:
+            table = cache.response_table(case, directory)
+        profile = out / 'profile.mcap'
+        write_speed_profile(profile, MACHINE, *speed_profile())
+        print(f'{MACHINE}: run-up to {_FASTEST_RPM:g} rpm, dwell, coast-down: '
+              f'{_RUN_UP_S + _DWELL_S + _COAST_S:g} s', flush=True)
+        log = _live(path, profile, out, directory)
+    answers = _read(log)
+    _draw(case, table, answers, out / 'plots')
+    _summarise(case, answers, out, log)
+    return 0
+
+
+def speed_profile() -> tuple[IntArray, FloatArray]:
+    """Return stamps (n,) [ns] and speeds (n,) [rad/s] of the demonstration."""
+    time_s = np.arange(0.0, _RUN_UP_S + _DWELL_S + _COAST_S, 1.0 / _RATE_HZ)
+    share = np.clip(time_s / _RUN_UP_S, 0.0, 1.0)
+    coasting = np.clip((time_s - _RUN_UP_S - _DWELL_S) / _COAST_S, 0.0, 1.0)
+    slowing = (_SLOWEST_RPM / _FASTEST_RPM) ** coasting
+    speed_rpm = (_SLOWEST_RPM + share * (_FASTEST_RPM - _SLOWEST_RPM)) * slowing
+    stamp_ns = _START_NS + np.rint(time_s * NANOSECONDS).astype(np.int64)
+    return stamp_ns, np.asarray(rpm_to_rad_s(speed_rpm))
+
+
+def _live(case: Path, profile: Path, out: Path, directory: Path) -> Path:
+    """Let the replay talk to the node; return the directory of the node's log."""
+    environment = {**os.environ, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    # Programs on one domain hear each other: the demo takes one that nobody was given.
+    environment.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _ONE_DOMAIN_OF))
+    before = set(out.iterdir())
+    with _node(case, out, directory, environment):
+        replay = subprocess.run(
+            [sys.executable, '-m', 'rotorsoil_ros.cli', 'replay', str(profile)],
+            env=environment, check=False)
+    if replay.returncode != 0:
+        raise RotorSoilError(f'the replay failed; the node said, in {out / "node.log"}:\n'
+                             f'{(out / "node.log").read_text()}')
+    [log] = {path for path in set(out.iterdir()) - before if (path / 'metadata.yaml').exists()}
+    return log
+
+
+@contextmanager
+def _node(
+    case: Path, out: Path, directory: Path, environment: dict[str, str],
+) -> Iterator[None]:
+    """Run the node while the body does; leave its words in node.log."""
+    parameters = [f'machines:=[{MACHINE}]', f'{MACHINE}.case:={case}', f'log.directory:={out}',
+                  f'cache:={directory}', 'speed_reliability:=reliable', 'speed_depth:=1000']
+    command = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args']
+    for parameter in parameters:
+        command += ['-p', parameter]
+    with (out / 'node.log').open('w') as words:
+        node = subprocess.Popen(command, env=environment, stdout=words, stderr=words)
+        try:
+            yield
+        finally:
+            node.send_signal(signal.SIGINT)
+            try:
+                node.wait(_SHUTDOWN_S)
+            except subprocess.TimeoutExpired:
+                node.kill()
+                node.wait()
+    if node.returncode != 0:
+        raise RotorSoilError(f'the node ended with status {node.returncode}, see {words.name}')
+
+
+def _read(log: Path) -> _Answers:
+    """Read speeds and predicted amplitudes back from the log of the node."""
+    speeds: dict[int, float] = {}
+    stamps: list[int] = []
+    rows: list[FloatArray] = []
+    channels: tuple[str, ...] = ()
+    wanted = {f'/{MACHINE}/joint_states', f'/rotorsoil/{MACHINE}/amplitude'}
+    for source, _, payload in bag_reader.messages(log, lambda topic, _: topic in wanted):
+        message = deserialize_message(bytes(payload), JointState)
+        stamp_ns = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+        if source.topic.endswith('/joint_states'):
+            speeds[stamp_ns] = message.velocity[0]
+        else:
+            channels = tuple(message.name)
+            stamps.append(stamp_ns)
+            rows.append(np.array(message.position))
+    return _Answers(np.array(stamps), np.array([speeds[stamp] for stamp in stamps]), channels,
+                    np.array(rows))
+
+
+def _draw(case: Case, table: ResponseTable, answers: _Answers, out: Path) -> None:
+    out.mkdir(exist_ok=True)
+    with progress('drawing') as report:
+        figures = list(all_figures(case, table))
+        figures.append(('demo', trend(
+            1e-9 * (answers.stamp_ns - answers.stamp_ns[0]), answers.speed, answers.amplitude,
+            channels=answers.channels, title=f'{MACHINE}: what the live node answered')))
+        for done, (name, figure) in enumerate(figures):
+            figure.savefig(out / f'{name}.png', dpi=150)
+            report(done + 1, len(figures))
+
+
+def _summarise(case: Case, answers: _Answers, out: Path, log: Path) -> None:
+    sent = len(speed_profile()[0])
+    print(f'{sent} speeds sent over DDS, {len(answers.stamp_ns)} answered and logged')
+    print('largest amplitudes, zero-to-peak:')
+    names = [f'{bearing.name}_housing_{axis}' for bearing in case.rotor.bearings for axis in 'xz']
+    names += [f'{disc.name}_{axis}' for disc in case.rotor.discs for axis in 'xz']
+    for name in names:
+        column = answers.amplitude[:, answers.channels.index(name)]
+        at = int(np.nanargmax(column))
+        print(f'  {name:22s} {1e6 * column[at]:10.4g} um at '
+              f'{rad_s_to_rpm(float(answers.speed[at])):6.0f} rpm')
+    print(f'log       {log}')
+    for recording in sorted(log.glob('*.rrd')):
+        print(f'recording {recording}   (rerun {recording})')
+    print(f'pictures  {out / "plots"}')

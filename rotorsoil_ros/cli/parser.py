@@ -1,0 +1,133 @@
+"""What may stand behind `rotorsoil`."""
+
+import argparse
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import NoReturn, TypeAlias
+
+import rotorsoil_ros
+
+_LONGEST_SWEEP = 10_000_000
+
+
+class _OneLineParser(argparse.ArgumentParser):
+    """Parser that says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with one line on standard error and status 2."""
+        self.exit(2, f'{self.prog}: {message} (see {self.prog} --help)\n')
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """Evenly spaced values `start:stop:count`, ends included."""
+
+    start: float
+    stop: float
+    count: int
+
+    @classmethod
+    def parse(cls, text: str) -> 'Sweep':
+        """Return the sweep that a command line asks for."""
+        try:
+            start, stop, count = text.split(':')
+            sweep = cls(float(start), float(stop), int(count))
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(
+                f'must be start:stop:count, ends included, got {text!r}') from error
+        if not (0.0 <= sweep.start <= sweep.stop < math.inf):
+            raise argparse.ArgumentTypeError(
+                f'must rise from start >= 0 to a finite stop, got {text!r}')
+        if not 1 <= sweep.count <= _LONGEST_SWEEP:
+            raise argparse.ArgumentTypeError(
+                f'must have 1 to {_LONGEST_SWEEP} values, got {text!r}')
+        return sweep
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not 0.0 < rate < math.inf:
+        raise argparse.ArgumentTypeError(f'must be a factor > 0, got {text!r}')
+    return rate
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of all verbs; each sets `run` to `module:function` of this package."""
+    top = _OneLineParser(
+        prog='rotorsoil', description='What a rotor on real soil should vibrate like.')
+    top.add_argument('--version', action='version', version=rotorsoil_ros.__version__)
+    verbs = top.add_subparsers(metavar='VERB', required=True)
+    _add_case_verbs(verbs)
+    _add_live_verbs(verbs)
+    return top
+
+
+_Verbs: TypeAlias = 'argparse._SubParsersAction[_OneLineParser]'
+
+
+def _verb(
+    verbs: _Verbs, name: str, run: str, says: str, *, case: bool = True,
+) -> argparse.ArgumentParser:
+    """Add one verb; those that take a case share its options."""
+    verb = verbs.add_parser(name, help=says, description=f'{says[0].upper()}{says[1:]}.')
+    verb.set_defaults(run=run)
+    if case:
+        verb.add_argument('case', metavar='CASE', type=Path, help='case file (YAML)')
+        verb.add_argument('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append',
+                          default=[], help='override the case file, as in '
+                                           'foundations.0.mass=420; may be repeated')
+        verb.add_argument('--cache', metavar='DIR', type=Path,
+                          help='directory of computed tables (else $ROTORSOIL_CACHE, else the '
+                               "user's cache directory)")
+    return verb
+
+
+def _add_output(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument('-o', '--output', metavar='FILE', default='-',
+                      help='CSV file to write; - is standard output (default)')
+
+
+def _add_case_verbs(verbs: _Verbs) -> None:
+    _verb(verbs, 'check', 'report:check',
+          'validate a case; print its derived quantities and warnings')
+    _verb(verbs, 'tabulate', 'report:tabulate', 'compute or load the tables of a case')
+    compliance = _verb(verbs, 'compliance', 'sweeps:compliance',
+                       'write the compliance of the soil under a block as CSV')
+    sweep = compliance.add_mutually_exclusive_group(required=True)
+    sweep.add_argument('--a0', metavar='A:B:N', type=Sweep.parse,
+                       help='dimensionless frequency, omega b / c_s or omega r0 / c_s')
+    sweep.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, help='frequency [Hz]')
+    compliance.add_argument('--foundation', metavar='NAME', help='which block, if several')
+    _add_output(compliance)
+    response = _verb(verbs, 'response', 'sweeps:response',
+                     'write the unbalance response of every channel as CSV')
+    sweep = response.add_mutually_exclusive_group(required=True)
+    sweep.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse, help='rotor speed [rpm]')
+    sweep.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, help='rotor speed [turns/s]')
+    _add_output(response)
+    plot = _verb(verbs, 'plot', 'pictures:plot', 'draw every picture of a case')
+    plot.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
+                      help='directory for the PNG files')
+
+
+def _add_live_verbs(verbs: _Verbs) -> None:
+    predict = _verb(verbs, 'predict', 'bags:predict',
+                    'answer every speed of a recorded profile, without a ROS graph')
+    predict.add_argument('profile', metavar='PROFILE', type=Path, help='MCAP file or bag')
+    predict.add_argument('-o', '--output', metavar='OUT.mcap', type=Path, required=True,
+                         help='log to write')
+    predict.add_argument('--rrd', metavar='OUT.rrd', type=Path,
+                         help='recording for the rerun viewer')
+    replay = _verb(verbs, 'replay', 'bags:replay',
+                   'publish a recorded profile into the ROS graph', case=False)
+    replay.add_argument('profile', metavar='PROFILE', type=Path, help='MCAP file or bag')
+    replay.add_argument('--rate', metavar='R', type=_rate, default=1.0,
+                        help='speed of replay (default: 1, as recorded)')
+    demo = _verb(verbs, 'demo', 'demo:demo',
+                 'run up, dwell and coast down a machine before a live node', case=False)
+    demo.add_argument('-o', '--output', metavar='DIR', type=Path, default=Path('demo_output'),
+                      help='directory for log, recording and plots (default: demo_output)')

@@ -1,0 +1,96 @@
+"""What a case answers over a range, as CSV."""
+
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+import sys
+from typing import TextIO
+
+import numpy as np
+
+from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.cli.parser import Sweep
+from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.physics.foundation import Foundation
+from rotorsoil_ros.physics.soil import DOFS, SoilModel
+from rotorsoil_ros.physics.units import hz_to_rad_s, rpm_to_rad_s
+
+# Rows computed together: bounds memory however long the sweep.
+_CHUNK = 4096
+
+
+def compliance(arguments: Namespace) -> int:
+    """Write omega, a0 and every compliance that is not zero."""
+    case = load(arguments.case, arguments.overrides)
+    foundation, model = _contact(case, arguments.foundation)
+    per_a0 = (np.nan if case.soil is None else
+              case.soil.shear_wave_speed / foundation.contact.characteristic_length)
+    if arguments.a0 is not None and case.soil is None:
+        raise InputError(f'{case.path}: soil: is missing; --a0 needs its c_s, --hz does not')
+    omega = (hz_to_rad_s(_values(arguments.hz)) if arguments.a0 is None
+             else per_a0 * _values(arguments.a0))
+    moving = np.any(model.compliance(omega) != 0.0, axis=0)
+    names = [DOFS[i] + DOFS[j] for i, j in zip(*np.nonzero(moving), strict=True)]
+
+    def rows(part: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        return np.stack([part, part / per_a0], axis=1), model.compliance(part)[:, moving]
+
+    _write(arguments.output, ['omega_rad_s', 'a0'], names, omega, rows)
+    return 0
+
+
+def _contact(case: Case, name: str | None) -> tuple[Foundation, SoilModel]:
+    """Return the block of that name, or the only one, and what it stands on."""
+    contacts = {foundation.name: (foundation, model) for foundation, model
+                in zip(case.foundations, case.soil_models(), strict=True)}
+    if name is None and len(contacts) == 1:
+        name = next(iter(contacts))
+    if name is None or name not in contacts:
+        raise InputError(f'{case.path}: foundations: --foundation must be one of '
+                         f'{", ".join(contacts) or "none, there is no block"}, got {name}')
+    return contacts[name]
+
+
+def response(arguments: Namespace) -> int:
+    """Write the displacement of every channel, solved at every speed."""
+    case = load(arguments.case, arguments.overrides)
+    model = case.coupled_model()
+    speed = (rpm_to_rad_s(_values(arguments.rpm)) if arguments.hz is None
+             else hz_to_rad_s(_values(arguments.hz)))
+
+    def rows(part: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        return part[:, None], model.unbalance_response(part, case.unbalance).displacement
+
+    _write(arguments.output, ['speed_rad_s'], model.channels, speed, rows)
+    return 0
+
+
+def _values(sweep: Sweep) -> FloatArray:
+    return np.linspace(sweep.start, sweep.stop, sweep.count)
+
+
+def _write(
+    target: str, real: Iterable[str], complexes: Iterable[str], sweep: FloatArray,
+    rows: Callable[[FloatArray], tuple[FloatArray, ComplexArray]],
+) -> None:
+    """Write a header and, chunk by chunk, real and complex columns in full precision."""
+    header = [*real, *(f'{name}_{part}' for name in complexes for part in ('re', 'im'))]
+    with _opened(target) as stream, progress('solving') as report:
+        stream.write(','.join(header) + '\n')
+        for start in range(0, len(sweep), _CHUNK):
+            keys, values = rows(sweep[start:start + _CHUNK])
+            table = np.concatenate([keys, np.ascontiguousarray(values).view(float)], axis=1)
+            stream.writelines(','.join(map(repr, row)) + '\n' for row in table.tolist())
+            report(start + len(keys), len(sweep))
+
+
+@contextmanager
+def _opened(target: str) -> Iterator[TextIO]:
+    """Open a file for writing; `-` is standard output."""
+    if target == '-':
+        yield sys.stdout
+        return
+    with open(target, 'w', encoding='utf-8') as stream:
+        yield stream

@@ -1,0 +1,240 @@
+"""The verbs as a user meets them."""
+
+import csv
+import io
+import math
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.case.config import load
+from rotorsoil_ros.cli import main
+from rotorsoil_ros.physics.cone import ConeModel
+from rotorsoil_ros.physics.units import rpm_to_rad_s
+
+ROOT = Path(__file__).parents[1]
+PAPER = str(ROOT / 'config' / 'paper_rotor.yaml')
+FAN = str(ROOT / 'config' / 'plant_fan.yaml')
+KIT = str(ROOT / 'config' / 'rk4_rotor_kit.yaml')
+PROGRAM = [sys.executable, '-m', 'rotorsoil_ros.cli']
+
+
+def table_of(text):
+    """Return a CSV as its header and an array."""
+    header, *rows = csv.reader(io.StringIO(text))
+    return header, np.array(rows, dtype=float)
+
+
+def complex_column(header, rows, name):
+    return rows[:, header.index(f'{name}_re')] + 1j * rows[:, header.index(f'{name}_im')]
+
+
+def test_response_is_that_of_the_model_to_the_last_bit(capsys):
+    assert main(['response', PAPER, '--rpm', '60:9000:7']) == 0
+    header, rows = table_of(capsys.readouterr().out)
+    case = load(Path(PAPER))
+    model = case.coupled_model()
+    speed = rpm_to_rad_s(np.linspace(60.0, 9000.0, 7))
+    expected = model.unbalance_response(speed, case.unbalance).displacement
+    assert header[0] == 'speed_rad_s'
+    assert header[1:] == [f'{name}_{part}' for name in model.channels for part in ('re', 'im')]
+    np.testing.assert_array_equal(rows[:, 0], speed)
+    for column, name in enumerate(model.channels):
+        np.testing.assert_array_equal(complex_column(header, rows, name), expected[:, column])
+
+
+def test_turns_per_second_are_another_word_for_rpm(capsys):
+    assert main(['response', PAPER, '--hz', '1:150:4']) == 0
+    by_hz = capsys.readouterr().out
+    assert main(['response', PAPER, '--rpm', '60:9000:4']) == 0
+    np.testing.assert_allclose(table_of(by_hz)[1], table_of(capsys.readouterr().out)[1],
+                               rtol=1e-9)  # 60 x is rounded before the solve
+
+
+def test_long_sweep_is_that_of_its_parts(capsys):
+    assert main(['response', KIT, '--rpm', '600:900:5001']) == 0  # longer than one chunk
+    _, rows = table_of(capsys.readouterr().out)
+    assert len(rows) == 5001
+    assert main(['response', KIT, '--rpm', '900:900:1']) == 0
+    np.testing.assert_allclose(table_of(capsys.readouterr().out)[1][0], rows[-1], rtol=1e-9)
+
+
+def test_compliance_is_that_of_the_cones_at_a0(capsys):
+    assert main(['compliance', PAPER, '--a0', '0:2:5']) == 0
+    header, rows = table_of(capsys.readouterr().out)
+    case = load(Path(PAPER))
+    a0 = np.linspace(0.0, 2.0, 5)
+    omega = a0 * math.sqrt(48e6 / 1900.0) / 0.5
+    expected = ConeModel(case.soil, case.foundations[0].contact).compliance(omega)
+    assert header == ['omega_rad_s', 'a0', *(f'{ij}_{part}' for ij in (
+        'xx', 'yy', 'zz', 'rxrx', 'ryry', 'rzrz') for part in ('re', 'im'))]
+    np.testing.assert_allclose(rows[:, 0], omega, rtol=1e-14)
+    np.testing.assert_allclose(rows[:, 1], a0, rtol=1e-14)
+    for dof, name in enumerate(('xx', 'yy', 'zz', 'rxrx', 'ryry', 'rzrz')):
+        np.testing.assert_allclose(complex_column(header, rows, name), expected[:, dof, dof],
+                                   rtol=1e-13)  # omega is rounded once more
+
+
+def test_compliance_over_hz_tells_a0(capsys):
+    assert main(['compliance', FAN, '--hz', '0:50:3']) == 0
+    _, rows = table_of(capsys.readouterr().out)
+    np.testing.assert_allclose(rows[:, 0], 2.0 * math.pi * np.array([0.0, 25.0, 50.0]))
+    np.testing.assert_allclose(rows[:, 1], rows[:, 0] * 1.0 / math.sqrt(100e6 / 1900.0))
+
+
+def test_rigid_ground_has_no_compliance_to_write(capsys):
+    assert main(['compliance', PAPER, '--hz', '0:50:2', '--set', 'support.model=rigid']) == 0
+    assert capsys.readouterr().out.splitlines()[0] == 'omega_rad_s,a0'
+
+
+def test_file_gets_what_standard_output_gets(tmp_path, capsys):
+    assert main(['response', PAPER, '--rpm', '60:900:3', '-o', '-']) == 0
+    printed = capsys.readouterr().out
+    assert main(['response', PAPER, '--rpm', '60:900:3', '-o', str(tmp_path / 'r.csv')]) == 0
+    assert (tmp_path / 'r.csv').read_text() == printed
+    assert capsys.readouterr().out == ''
+
+
+def test_check_prints_what_follows_from_the_case(capsys, tmp_path):
+    assert main(['check', PAPER, '--cache', str(tmp_path)]) == 0
+    lines = dict(line.split('  ', 1) for line in capsys.readouterr().out.splitlines())
+    lines = {name: value.strip() for name, value in lines.items()}
+    assert lines['shear wave speed c_s'] == '158.94 m/s'  # design note, theory/rotor.md
+    assert lines['dilatational wave speed c_p'] == '275.3 m/s'
+    assert lines['block: static stiffness z'] == '1.444e+08 N/m'
+    assert lines['block: static stiffness x'] == '1.238e+08 N/m'
+    assert lines['block: static stiffness ry'] == '3.173e+07 N m/rad'
+    assert lines['block: mass over rotor mass'] == '10'
+    assert any(name.startswith('peak at') for name in lines)
+
+
+@pytest.mark.parametrize('case, setting, warning', [
+    (PAPER, 'unbalances=[]', 'unbalances: none, every prediction will be zero'),
+    (PAPER, 'rotor.discs.0.polar_inertia=1', 'disc_1: polar inertia 1 kg m^2 is more than twice'),
+    (PAPER, 'foundations.0.inertia=[1, 1, 3]', 'block: inertia 3 kg m^2 about one axis'),
+    (PAPER, 'soil.shear_modulus=10e6', 'block: a0 reaches 6.5; above 6 cones are off'),
+    (PAPER, 'soil.poisson_ratio=0.45', 'block: a0 reaches 2.96; above 2 cones are off'),
+    (FAN, 'foundations.0.half_length=3', 'block: contact is 3 times as long as wide'),
+])
+def test_check_warns(case, setting, warning, capsys):
+    assert main(['check', case, '--set', setting]) == 0
+    assert f'warning: {warning}' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('case', [PAPER, FAN, KIT])
+def test_cases_as_they_are_give_no_warning(case, capsys):
+    assert main(['check', case]) == 0
+    assert 'warning' not in capsys.readouterr().out
+
+
+def test_tabulate_tells_what_it_computed_and_where_it_lies(capsys, tmp_path):
+    assert main(['tabulate', KIT, '--cache', str(tmp_path)]) == 0
+    first = capsys.readouterr().out
+    assert main(['tabulate', KIT, '--cache', str(tmp_path)]) == 0
+    second = capsys.readouterr().out
+    [file] = tmp_path.iterdir()
+    assert 'response table                           computed in' in first
+    assert 'response table                           loaded in' in second
+    assert str(file) in first
+    assert str(file) in second
+
+
+def test_table_that_cannot_be_stored_is_used_all_the_same(capsys, tmp_path, caplog):
+    obstacle = tmp_path / 'file'
+    obstacle.touch()
+    assert main(['tabulate', KIT, '--cache', str(obstacle)]) == 0
+    assert 'cannot be written' in caplog.text
+
+
+@pytest.mark.parametrize('arguments, problem', [
+    (['check', 'nothing.yaml'], 'nothing.yaml: cannot be read: No such file or directory'),
+    (['check', '/'], '/: cannot be read: Is a directory'),
+    (['check', PAPER, '--set', 'foundations.0.mass=-1'],
+     f'{PAPER}: foundations.0.mass: must be >= 0 kg and finite, got -1'),
+    (['check', PAPER, '--set', 'soil.shear_modulus=1e-300'],
+     f'{PAPER}: the coupled system has no finite solution'),
+    (['check', PAPER, '--set', 'mass'], '--set mass: must be key.path=value'),
+    (['response', PAPER, '--rpm', '60:900:3', '-o', '/'], '/: Is a directory'),
+    (['response', PAPER, '--rpm', '60:900:3', '-o', '/nothing/x.csv'],
+     '/nothing/x.csv: No such file or directory'),
+    (['response', PAPER, '--rpm', '60:900:3', '-o', '/dev/full'],
+     'standard output: No space left on device'),
+    (['plot', KIT, '-o', f'{PAPER}/below'], f'{PAPER}/below: Not a directory'),
+    (['compliance', KIT, '--hz', '0:1:2'],
+     f'{KIT}: foundations: --foundation must be one of none, there is no block, got None'),
+    (['compliance', PAPER, '--hz', '0:1:2', '--foundation', 'blok'],
+     f'{PAPER}: foundations: --foundation must be one of block, got blok'),
+    (['compliance', PAPER, '--a0', '0:1:2', '--set', 'support.model=rigid', '--set', 'soil='],
+     f'{PAPER}: soil: is missing; --a0 needs its c_s, --hz does not'),
+    (['predict', PAPER, 'nothing.mcap', '-o', 'x.mcap'], 'nothing.mcap: '),
+])
+def test_bad_input_is_one_line_and_status_2(arguments, problem, capfd):
+    assert main(arguments) == 2
+    said = capfd.readouterr().err
+    assert said.startswith(problem)
+    assert said.count('\n') == 1
+
+
+@pytest.mark.parametrize('arguments, problem', [
+    ([], 'rotorsoil: the following arguments are required: VERB'),
+    (['nothing'], "rotorsoil: argument VERB: invalid choice: 'nothing'"),
+    (['response', PAPER], 'rotorsoil response: one of the arguments --rpm --hz is required'),
+    (['response', PAPER, '--rpm', '1:2'],
+     "rotorsoil response: argument --rpm: must be start:stop:count, ends included, got '1:2'"),
+    (['response', PAPER, '--rpm', '2:1:5'],
+     "rotorsoil response: argument --rpm: must rise from start >= 0 to a finite stop, "
+     "got '2:1:5'"),
+    (['response', PAPER, '--rpm', '-2:1:5'], 'rotorsoil response: argument --rpm: '),
+    (['response', PAPER, '--rpm', '0:nan:5'], 'rotorsoil response: argument --rpm: must rise'),
+    (['response', PAPER, '--rpm', '0:inf:5'], 'rotorsoil response: argument --rpm: must rise'),
+    (['response', PAPER, '--rpm', '0:1:0'],
+     "rotorsoil response: argument --rpm: must have 1 to 10000000 values, got '0:1:0'"),
+    (['response', PAPER, '--rpm', '0:1:2.5'], 'rotorsoil response: argument --rpm: must be start'),
+    (['replay', 'x.mcap', '--rate', '0'],
+     "rotorsoil replay: argument --rate: must be a factor > 0, got '0'"),
+    (['replay', 'x.mcap', '--rate', 'nan'], 'rotorsoil replay: argument --rate: must be a factor'),
+])
+def test_bad_command_line_is_one_line_and_status_2(arguments, problem, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith(problem)
+    assert said.count('\n') == 1
+
+
+def test_plot_writes_every_picture(tmp_path, capsys):
+    assert main(['plot', PAPER, '-o', str(tmp_path / 'new' / 'plots')]) == 0
+    names = {Path(line).stem for line in capsys.readouterr().out.splitlines()}
+    assert names == {'machine', 'support', 'bode_journals', 'bode_housings', 'bode_discs',
+                     'bode_foundations', 'bode_rocking', 'orbits', 'shapes'}
+    for path in (tmp_path / 'new' / 'plots').iterdir():
+        assert path.read_bytes().startswith(b'\x89PNG')
+
+
+def test_machine_that_does_not_move_is_drawn_all_the_same(tmp_path, capsys):
+    assert main(['plot', PAPER, '--set', 'unbalances=[]', '-o', str(tmp_path)]) == 0
+    assert (tmp_path / 'bode_discs.png').exists()
+
+
+def test_help_needs_no_numpy():
+    code = ('import sys; from rotorsoil_ros.cli import main\n'
+            'try: main(["--help"])\nexcept SystemExit: pass\n'
+            'print({"numpy", "pydantic", "rclpy", "rerun", "matplotlib", "rich"} '
+            '& set(sys.modules), file=sys.stderr)')
+    done = subprocess.run([sys.executable, '-c', code], cwd=ROOT, capture_output=True, text=True,
+                          check=True)
+    assert done.stderr == 'set()\n'
+    assert 'VERB' in done.stdout
+
+
+def test_reader_that_has_seen_enough_hears_no_complaint():
+    with subprocess.Popen([*PROGRAM, 'response', PAPER, '--rpm', '60:9000:2000'], cwd=ROOT,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout.readline().startswith(b'speed_rad_s,')
+        process.stdout.close()
+        assert process.stderr.read() == b''
+    assert process.returncode == 0
