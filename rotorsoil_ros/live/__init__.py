@@ -1,0 +1,1 @@
+"""Streams: the monitor, its messages, logs, viewer and node."""

@@ -1,0 +1,166 @@
+"""How do messages that come in, from the graph or from a bag, reach the monitor of a machine."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+import struct
+from typing import TypeAlias
+
+import numpy as np
+
+from rotorsoil_ros.live.cdr import BODY, JointLayout, JointStateReader, LITTLE_ENDIAN
+from rotorsoil_ros.live.events import Measured
+from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE, Records
+from rotorsoil_ros.live.monitor import Monitor
+from rotorsoil_ros.physics.arrays import FloatArray
+
+SPEED_TOPICS = {'joint_states': JOINT_STATE, 'rotor/speed': FLOAT64}
+MEASURED_TOPICS = {'measured/amplitude': JOINT_STATE, 'measured/phase': JOINT_STATE}
+TOPICS = SPEED_TOPICS | MEASURED_TOPICS
+ROTOR_JOINT = 'rotor'
+UNREAD = ('malformed', 'joint_missing')  # of no use, not even for the log
+
+Note: TypeAlias = Callable[[str, int], None]
+Outlet: TypeAlias = Callable[[Records], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Speeds:
+    """Messages that told a speed, with their n stamps [ns] and speeds (n,) [rad/s]."""
+
+    messages: Sequence[bytes]
+    stamps: Sequence[int]
+    speed: FloatArray
+
+
+class SpeedReader:
+    """Reads the speeds of one topic; what it cannot read it counts by its reason."""
+
+    def __init__(self, message_type: str, *, rotor_joint: str, note: Note) -> None:
+        self._read = _read_float if message_type == FLOAT64 else JointSpeed(rotor_joint).read
+        self._note = note
+
+    def read(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> Speeds:
+        """Read messages that were received at the given times [ns]."""
+        messages, stamps, speeds = [], [], []
+        for received, cdr in zip(received_ns, cdrs, strict=True):
+            stamp, speed, fault = self._read(received, cdr)
+            if fault:
+                self._note(fault, 1)
+            if fault not in UNREAD:
+                messages.append(cdr)
+                stamps.append(stamp)
+                speeds.append(speed)
+        return Speeds(messages, stamps, np.array(speeds, dtype=float))
+
+
+class JointSpeed:
+    """Finds the velocity of one joint in JointStates, one by one."""
+
+    def __init__(self, joint: str) -> None:
+        self._joint = joint
+        self._reader = JointStateReader()
+        self._layout: JointLayout | None = None
+        self._fault = ''
+        self._unpack = struct.Struct('<d').unpack_from
+        self._at = 0
+
+    def read(self, received_ns: int, cdr: bytes) -> tuple[int, float, str]:
+        """Return stamp [ns], speed [rad/s] and fault; the stamp is the message's own."""
+        del received_ns
+        layout = self._reader.layout(cdr)
+        if layout is not self._layout:
+            self._learn(layout)
+        if layout is None or self._fault == 'joint_missing':
+            return 0, math.nan, self._fault
+        stamp = layout.stamp_ns(cdr)
+        if stamp < 0:
+            return 0, math.nan, 'malformed'
+        return stamp, math.nan if self._fault else self._unpack(cdr, self._at)[0], self._fault
+
+    def _learn(self, layout: JointLayout | None) -> None:
+        """Find out where in such messages the velocity is, or why it is not there."""
+        self._layout = layout
+        if layout is None:
+            self._fault = 'malformed'
+        elif self._joint not in layout.names:
+            self._fault = 'joint_missing'
+        else:
+            velocities, number = layout.span('velocity'), layout.names.index(self._joint)
+            self._at = velocities.start + 8 * number
+            self._fault = '' if self._at < velocities.stop else 'velocity_missing'
+            self._unpack = struct.Struct(layout.order + 'd').unpack_from
+
+
+def _read_float(received_ns: int, cdr: bytes) -> tuple[int, float, str]:
+    """Return stamp [ns], speed [rad/s] and fault of a Float64, stamped when it was received."""
+    if len(cdr) < BODY + 8 or cdr[0] != 0 or cdr[1] > LITTLE_ENDIAN:
+        return 0, math.nan, 'malformed'
+    order = '<d' if cdr[1] == LITTLE_ENDIAN else '>d'
+    return received_ns, struct.unpack_from(order, cdr, BODY)[0], ''
+
+
+class SpeedInlet:
+    """Asks the monitor at every speed of one topic, and logs the message as it came."""
+
+    def __init__(
+        self, topic: str, message_type: str, monitor: Monitor, *, rotor_joint: str, log: Outlet,
+    ) -> None:
+        self._topic = topic
+        self._type = message_type
+        self._monitor = monitor
+        self._log = log
+        self._reader = SpeedReader(
+            message_type, rotor_joint=rotor_joint, note=monitor.health.note)
+
+    def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
+        """Take in messages that were received at the given times [ns]."""
+        speeds = self._reader.read(received_ns, cdrs)
+        if speeds.messages:
+            self._log(Records(self._topic, self._type, speeds.stamps, speeds.messages))
+            self._monitor.on_speed(np.array(speeds.stamps, dtype=np.int64), speeds.speed)
+
+
+class MeasuredInlet:
+    """Tells the monitor amplitudes or phases that were measured, and logs them as they came."""
+
+    def __init__(self, topic: str, quantity: str, monitor: Monitor, *, log: Outlet) -> None:
+        self._topic = topic
+        self._quantity = quantity
+        self._monitor = monitor
+        self._log = log
+        self._reader = JointStateReader()
+
+    def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
+        """Take in messages; their own stamps count, not when they were received."""
+        for messages, states in self._reader.runs(cdrs):
+            if states is None or states.stamp_ns.min() < 0:
+                self._monitor.health.note('malformed', len(messages))
+                continue
+            self._log(Records(self._topic, JOINT_STATE, states.stamp_ns.tolist(), messages))
+            self._monitor.on_measured(Measured(
+                self._monitor.machine, self._quantity, states.stamp_ns, states.names,
+                states.position, states.velocity))
+
+
+def inlet(
+    name: str, topic: str, monitor: Monitor, *, rotor_joint: str, log: Outlet,
+) -> SpeedInlet | MeasuredInlet:
+    """
+    Return what takes in the messages of one of TOPICS.
+
+    Parameters
+    ----------
+    name, topic : str
+        Name below the machine's, and in full: under this one the messages are logged.
+    monitor : Monitor
+        Of the machine.
+    rotor_joint : str
+        Joint whose velocity is the rotor speed.
+    log : callable
+        Where accepted messages are written, byte for byte, at their own stamps.
+
+    """
+    if name in SPEED_TOPICS:
+        return SpeedInlet(topic, SPEED_TOPICS[name], monitor, rotor_joint=rotor_joint, log=log)
+    return MeasuredInlet(topic, name.removeprefix('measured/'), monitor, log=log)

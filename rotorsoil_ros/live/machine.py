@@ -1,0 +1,49 @@
+"""Which machine is watched: its case, its table, and what may be said of both."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import rotorsoil_ros
+from rotorsoil_ros.case import cache, config
+from rotorsoil_ros.physics.arrays import ComplexArray
+from rotorsoil_ros.physics.response import ResponseTable
+
+UNITS = {
+    'position': 'displacement, m or rad, zero-to-peak',
+    'velocity': 'm/s or rad/s, zero-to-peak',
+    'effort': 'transmitted force, N or N m, zero-to-peak',
+    'phase': 'rad',
+    'convention': 'x(t) = Re(X exp(+i omega t))',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A case with its response table."""
+
+    case: config.Case
+    table: ResponseTable
+
+    @classmethod
+    def load(
+        cls, case_file: Path, *, cache_directory: Path | None, overrides: Sequence[str] = (),
+    ) -> 'Machine':
+        """Read a case and load its table, computing it where the cache has none."""
+        case = config.load(case_file, overrides)
+        return cls(case, cache.response_table(case, cache.directory(cache_directory)))
+
+    def description(self, name: str, unbalance: ComplexArray) -> Mapping[str, object]:
+        """Return what the predictions under this name and this unbalance rest on."""
+        return {
+            'machine': name, 'case': self.case.name, 'version': rotorsoil_ros.__version__,
+            'tables': {'response': self.table.key}, 'accuracy': self.table.accuracy,
+            'speed_range_rad_s': list(self.table.speed_range),
+            'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
+            'unbalance': {
+                disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
+                for disc, value in zip(self.table.planes, unbalance, strict=True)},
+            'units': UNITS,
+        }

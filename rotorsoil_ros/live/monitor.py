@@ -1,0 +1,99 @@
+"""What should the machine do at the speed it has just reported? Look it up, never invent it."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rotorsoil_ros.live.events import Event, Measured, Model, Predicted, Sink
+from rotorsoil_ros.live.health import Health
+from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.errors import OutOfTableError
+from rotorsoil_ros.physics.prediction import Prediction
+from rotorsoil_ros.physics.response import ResponseTable
+
+NO_ANSWER = complex(np.nan, np.nan)
+
+
+class Monitor:
+    """
+    Answer every reported speed of one machine from its response table.
+
+    A batch of one (live) and of thousands (offline) take the same path and give bitwise the
+    same numbers. No clock is read: every time comes in with the caller.
+    """
+
+    def __init__(
+        self, machine: str, table: ResponseTable, unbalance: ComplexArray, *,
+        sinks: Sequence[Sink],
+    ) -> None:
+        self.machine = machine
+        self.table = table
+        self.health = Health(machine, table.speed_range)
+        self._sinks = tuple(sinks)
+        self.set_unbalance(unbalance)
+
+    def set_unbalance(self, unbalance: ComplexArray) -> None:
+        """Use another unbalance, (planes,) [kg m], from the next speed on."""
+        self._predictor = self.table.predictor(unbalance)
+
+    def on_speed(self, stamp_ns: IntArray, speed: FloatArray) -> None:
+        """Answer speeds [rad/s] and their stamps [ns], both of shape (n,)."""
+        if not len(speed):
+            return
+        self.health.last_speed = float(speed[-1])
+        self.health.note('received', len(speed))
+        try:
+            prediction = self._predictor.predict(speed)
+            self.health.note('answered', len(speed))
+        except OutOfTableError:
+            prediction = self._predict_with_gaps(speed)
+        self._emit(Predicted(self.machine, stamp_ns, prediction))
+        if self.health.has_news:
+            self._emit(self.health.announce(int(stamp_ns[-1])))
+
+    def on_measured(self, measured: Measured) -> None:
+        """Hand on what a measuring system says about this machine."""
+        self.health.note('measured', len(measured.stamp_ns))
+        self._emit(measured)
+
+    def begin(self, now_ns: int, description: Mapping[str, object]) -> None:
+        """Begin to watch, and say what the predictions rest on."""
+        self.health.begin(now_ns)
+        self.describe(now_ns, description)
+
+    def describe(self, now_ns: int, description: Mapping[str, object]) -> None:
+        """Say what the predictions rest on from now on."""
+        self._emit(Model(self.machine, now_ns, description))
+
+    def tick(self, now_ns: int, *, stale_after_s: float) -> None:
+        """Report the health of the machine over the time since the last tick."""
+        self._emit(self.health.tick(now_ns, stale_after_s=stale_after_s))
+
+    def _emit(self, event: Event) -> None:
+        for sink in self._sinks:
+            sink(event)
+
+    def _predict_with_gaps(self, speed: FloatArray) -> Prediction:
+        """Answer what is covered; count the reason and leave NaN where nothing is."""
+        covered = self._predictor.covers(speed)
+        for reason, holds in self._reasons(speed[~covered]).items():
+            self.health.note(reason, int(np.count_nonzero(holds)))
+        shape = (len(speed), len(self.table.channels))
+        displacement, force = np.full(shape, NO_ANSWER), np.full(shape, NO_ANSWER)
+        if covered.any():
+            answer = self._predictor.predict(speed[covered])
+            self.health.note('answered', len(answer.speed))
+            displacement[covered], force[covered] = answer.displacement, answer.force
+        return Prediction(speed, displacement, force)
+
+    def _reasons(self, speed: FloatArray) -> dict[str, BoolArray]:
+        """Tell for each reason which of the speeds have no answer because of it."""
+        lowest, highest = self.table.speed_range
+        reasons = {'nan': np.isnan(speed), 'infinite': np.isinf(speed)}
+        finite = np.isfinite(speed)
+        reasons['negative'] = finite & (speed < 0.0)
+        reasons['below_table'] = finite & (speed >= 0.0) & (speed < lowest)
+        reasons['above_table'] = finite & (speed > highest)
+        known = np.logical_or.reduce(list(reasons.values()))
+        reasons['unresolved'] = ~known
+        return reasons

@@ -1,0 +1,120 @@
+"""One machine on the graph: its subscriptions, its monitor and its publishers."""
+
+from functools import partial
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+
+from rotorsoil_ros.live.inlets import inlet, MeasuredInlet, SpeedInlet, TOPICS
+from rotorsoil_ros.live.machine import Machine
+from rotorsoil_ros.live.messages import (
+    Encoder,
+    FLOAT64,
+    JOINT_STATE,
+    Messenger,
+    Records,
+    Topics,
+)
+from rotorsoil_ros.live.monitor import Monitor
+from rotorsoil_ros.live.parameters import Settings
+from rotorsoil_ros.live.run_log import RunLog
+
+TYPES = {JOINT_STATE: JointState, FLOAT64: Float64}
+STAMPED = (0,)  # reading the clock takes 3 us, and the message has its own stamp
+OUTPUT = QoSProfile(depth=10)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Watch:
+    """
+    Watches one machine while the node is active.
+
+    Messages stay bytes from the middleware to the monitor and back: what is published is what
+    is logged, and what a foreign publisher sends cannot break the node.
+    """
+
+    def __init__(
+        self, node: LifecycleNode, name: str, machine: Machine, *, settings: Settings,
+        log: RunLog, diagnostics: LifecyclePublisher,
+    ) -> None:
+        self.name = name
+        self.is_active = False
+        self._node = node
+        self._machine = machine
+        self._settings = settings
+        self._subscriptions: list[Any] = []
+        topics = self._publish(diagnostics)
+        encoder = Encoder(machine.table.channels, topics)
+        self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=[
+            Messenger(encoder, [self._send, log.write]), log.show])
+        self._subscribe(log)
+
+    def begin(self, now_ns: int) -> None:
+        """Answer from now on."""
+        self.is_active = True
+        self.monitor.begin(now_ns, self._description())
+
+    def tick(self, now_ns: int, *, stale_after_s: float) -> None:
+        """Report the health of the machine."""
+        if self.is_active:
+            self.monitor.tick(now_ns, stale_after_s=stale_after_s)
+
+    def take_unbalance(self, now_ns: int) -> None:
+        """Use the unbalance that the parameters now have, from the next speed on."""
+        self.monitor.set_unbalance(self._unbalance())
+        if self.is_active:
+            self.monitor.describe(now_ns, self._description())
+
+    def destroy(self) -> None:
+        """Leave the graph."""
+        self.is_active = False
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        for publisher in self._own_publishers:
+            self._node.destroy_lifecycle_publisher(publisher)
+
+    def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
+        """Create the publishers; return the names that their topics have after remapping."""
+        create, own = self._node.create_lifecycle_publisher, f'~/{self.name}'
+        amplitude = create(JointState, f'{own}/amplitude', OUTPUT)
+        phase = create(JointState, f'{own}/phase', OUTPUT)
+        model = create(String, f'{own}/model', LATCHED)
+        self._own_publishers = [amplitude, phase, model]
+        self._publishers = {publisher.topic_name: publisher
+                            for publisher in (*self._own_publishers, diagnostics)}
+        return Topics(amplitude.topic_name, phase.topic_name, model.topic_name,
+                      diagnostics.topic_name)
+
+    def _subscribe(self, log: RunLog) -> None:
+        profile = QoSProfile(
+            depth=self._settings.value('speed_depth'), reliability=ReliabilityPolicy[
+                self._settings.value('speed_reliability').upper()])
+        joint = self._settings.value(f'{self.name}.rotor_joint')
+        for name, kind in TOPICS.items():
+            topic = self._node.resolve_topic_name(f'{self.name}/{name}')
+            taken_in = inlet(name, topic, self.monitor, rotor_joint=joint, log=log.write)
+            receive = self._receive_bare if kind == FLOAT64 else self._receive_stamped
+            self._subscriptions.append(self._node.create_subscription(
+                TYPES[kind], topic, partial(receive, taken_in), profile, raw=True))
+
+    def _receive_stamped(self, taken_in: SpeedInlet | MeasuredInlet, cdr: bytes) -> None:
+        if self.is_active:
+            taken_in(STAMPED, (cdr,))
+
+    def _receive_bare(self, taken_in: SpeedInlet | MeasuredInlet, cdr: bytes) -> None:
+        if self.is_active:
+            taken_in((self._node.get_clock().now().nanoseconds,), (cdr,))
+
+    def _send(self, records: Records) -> None:
+        publish = self._publishers[records.topic].publish
+        for payload in records.payloads:
+            publish(payload)
+
+    def _unbalance(self) -> Any:
+        return self._settings.unbalance(self.name, self._machine.table.planes)
+
+    def _description(self) -> Any:
+        return self._machine.description(self.name, self._unbalance())

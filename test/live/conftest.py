@@ -1,0 +1,77 @@
+"""A machine whose table is computed once, and a ROS graph that nobody else sees."""
+
+import os
+from pathlib import Path
+import time
+import warnings
+
+from hypothesis import settings
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+
+from rotorsoil_ros.live.machine import Machine
+
+with warnings.catch_warnings():
+    warnings.simplefilter('ignore', DeprecationWarning)  # lark still imports sre_parse
+    import rosidl_generator_py  # noqa: F401 - rclpy imports it with the first message
+
+CASES = Path(__file__).parents[2] / 'config'
+PAPER_ROTOR = CASES / 'paper_rotor.yaml'
+DEADLINE_S = 10.0
+
+settings.register_profile('busy machine', deadline=None)
+settings.load_profile('busy machine')
+
+
+@pytest.fixture(scope='session')
+def case_file():
+    return PAPER_ROTOR
+
+
+@pytest.fixture(scope='session')
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp('tables')
+
+
+@pytest.fixture(scope='session')
+def machine(cache):
+    return Machine.load(PAPER_ROTOR, cache_directory=cache)
+
+
+class Graph:
+    """A ROS context on a domain of this process, a probe node in it, and who spins them."""
+
+    def __init__(self):
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=40 + os.getpid() % 20)
+        self.executor = EventsExecutor(context=self.context)
+        self.nodes = []
+        self.probe = self.add(Node('probe', context=self.context))
+
+    def add(self, node):
+        self.nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def until(self, holds, what='what was awaited'):
+        """Spin until something holds; fail at the deadline."""
+        deadline = time.monotonic() + DEADLINE_S
+        while not holds():
+            assert time.monotonic() < deadline, f'{what} did not happen in {DEADLINE_S} s'
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def close(self):
+        for node in reversed(self.nodes):
+            node.destroy_node()
+        self.executor.shutdown()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def graph():
+    graph = Graph()
+    yield graph
+    graph.close()

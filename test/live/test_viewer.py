@@ -1,0 +1,162 @@
+"""The recording shows what an engineer looks for, at the time at which it happened."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.live.events import Diagnostics, Level, Measured, Predicted
+from rotorsoil_ros.live.run_log import LogSettings, open_viewer, RunLog
+from rotorsoil_ros.physics.errors import InputError
+
+START = 1_790_000_000_000_000_000
+PERIOD = 10**7
+
+
+def column(path, entity, component, *, static=False):
+    """Read stamps [ns] and values of one component of one entity."""
+    from rerun.chunk import RrdReader
+    stamps, values = [], []
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # of the missing footer
+        for chunk in RrdReader(str(path)).stream():
+            batch = chunk.to_record_batch()
+            if (chunk.entity_path == entity and chunk.is_static == static
+                    and component in batch.schema.names):
+                values += batch.column(component).to_pylist()
+                if not static:
+                    stamps += batch.column('time').cast('int64').to_pylist()
+    return stamps, values
+
+
+@pytest.fixture
+def recorded(machine, tmp_path):
+    """Return a recording of events, and where it lies."""
+    pytest.importorskip('rerun', reason='rerun-sdk is optional')
+    path = tmp_path / 'run.rrd'
+
+    def record(*events, flush_each=False):
+        with open_viewer(path, {'fan': machine}) as viewer:
+            for event in events:
+                viewer(event)
+                if flush_each:
+                    viewer.flush()
+        return path
+    return record
+
+
+def predicted(machine, speeds, start=START, period=PERIOD):
+    speed = np.asarray(speeds, dtype=float)
+    predictor = machine.table.predictor(machine.case.unbalance)
+    known = predictor.covers(speed)
+    prediction = predictor.predict(np.where(known, speed, 300.0))
+    prediction.displacement[~known] = complex(np.nan, np.nan)
+    return Predicted('fan', start + period * np.arange(len(speed)), prediction)
+
+
+def test_a_channel_is_split_at_its_station_and_shown_in_micrometres(recorded, machine):
+    event = predicted(machine, [200.0, 300.0], period=5 * PERIOD)
+    stamps, values = column(
+        recorded(event), '/fan/bearing_1/journal_z/amplitude/predicted', 'Scalars:scalars')
+    shown = machine.table.channels.index('bearing_1_journal_z')
+    assert stamps == event.stamp_ns.tolist()
+    np.testing.assert_allclose(
+        np.ravel(values), 1e6 * np.abs(event.prediction.displacement[:, shown]), rtol=1e-12)
+
+
+def test_phase_is_shown_in_degrees_and_speed_in_rpm(recorded, machine):
+    event = predicted(machine, [200.0])
+    path = recorded(event)
+    _, phase = column(path, '/fan/disc_1/x/phase/predicted', 'Scalars:scalars')
+    _, speed = column(path, '/fan/speed', 'Scalars:scalars')
+    shown = machine.table.channels.index('disc_1_x')
+    assert phase == [[pytest.approx(np.degrees(np.angle(
+        event.prediction.displacement[0, shown])))]]
+    assert speed == [[pytest.approx(1909.859317)]]  # 200 * 60 / (2 pi)
+
+
+def test_trends_are_thinned_to_what_a_screen_shows_across_batches(recorded, machine):
+    events = [predicted(machine, [300.0] * 100, start=START + 100 * k * 10**6, period=10**6)
+              for k in range(3)]
+    stamps, _ = column(recorded(*events, flush_each=True), '/fan/speed', 'Scalars:scalars')
+    assert np.diff(stamps).tolist() == [20 * 10**6] * 14  # 300 ms at 50 per second
+
+
+def test_measured_values_lie_beside_the_predicted_ones(recorded):
+    events = [Measured('fan', quantity, np.array([START]), ('disc_1_x', 'unknown'),
+                       np.array([[value, 7.0]]), np.full((1, 2), np.nan))
+              for quantity, value in (('amplitude', 2e-6), ('phase', np.pi))]
+    path = recorded(*events)
+    assert column(path, '/fan/disc_1/x/amplitude/measured', 'Scalars:scalars') == (
+        [START], [[pytest.approx(2.0)]])
+    assert column(path, '/fan/disc_1/x/phase/measured', 'Scalars:scalars') == (
+        [START], [[pytest.approx(180.0)]])
+    _, names = column(path, '/fan/disc_1/x/amplitude/measured', 'SeriesPoints:names',
+                      static=True)
+    assert names == [['disc_1_x measured']]
+
+
+def test_the_picture_says_its_scale_and_draws_no_shaft_without_a_prediction(recorded, machine):
+    path = recorded(predicted(machine, [300.0, 2000.0, 300.0], period=10 * PERIOD))
+    _, words = column(path, '/fan/caption', 'TextDocument:text')
+    assert 'Displacements x' in words[0][0]
+    assert 'at 2865 rpm' in words[0][0]
+    assert 'No prediction at' in words[1][0]
+    _, shafts = column(path, '/fan/picture/shaft', 'LineStrips3D:strips')
+    assert [len(strips) for strips in shafts] == [1, 0, 1]
+    _, orbits = column(path, '/fan/picture/orbits', 'LineStrips3D:strips')
+    assert [len(strips) for strips in orbits] == [4, 0, 4]
+
+
+def test_the_block_moves_scaled_as_it_is_predicted_to(recorded, machine):
+    event = predicted(machine, [300.0])
+    path = recorded(event)
+    _, moved = column(path, '/fan/picture/block/moving', 'Transform3D:translation')
+    _, words = column(path, '/fan/caption', 'TextDocument:text')
+    scale = float(words[0][0].split(' x ')[1].split('*')[0])
+    first = machine.table.channels.index('block_x')
+    turn = 2.0 * np.pi * (START % (4 * 10**9)) / (4 * 10**9)
+    motion = np.real(event.prediction.displacement[0, first:first + 3] * np.exp(1j * turn))
+    np.testing.assert_allclose(moved[0][0], scale * motion, rtol=1e-6)  # single precision
+
+
+def test_nothing_that_moves_is_static_because_static_data_hides_it(recorded, machine):
+    path = recorded(predicted(machine, [300.0]))
+    for entity, component in (
+            ('block/moving', 'Transform3D:translation'), ('shaft', 'LineStrips3D:strips'),
+            ('orbits', 'LineStrips3D:strips'), ('discs', 'LineStrips3D:strips'),
+            ('stations', 'Points3D:positions')):
+        _, moving = column(path, f'/fan/picture/{entity}', component)
+        _, still = column(path, f'/fan/picture/{entity}', component, static=True)
+        assert (len(moving), len(still)) == (1, 0), entity
+
+
+def test_events_stand_at_the_data_that_they_follow_and_only_changes_are_told(recorded, machine):
+    def health(level, summary):
+        return Diagnostics('fan', 10**9, level, summary, {})
+
+    path = recorded(
+        health(Level.STALE, 'before anything was shown'), predicted(machine, [300.0]),
+        health(Level.OK, 'fine'), health(Level.OK, 'still fine'), health(Level.WARN, 'oh'),
+        flush_each=True)
+    stamps, words = column(path, '/fan/events', 'TextLog:text')
+    assert words == [['OK: fine'], ['WARN: oh']]
+    assert stamps == [START, START]
+
+
+def test_a_viewer_that_does_not_listen_is_told_and_costs_nothing(machine):
+    told = []
+    settings = LogSettings(
+        directory='', name='run', mcap=False, rerun=False, split_mib=0.0, split_s=0.0,
+        rerun_url='rerun+http://127.0.0.1:9/proxy')
+    log = RunLog(settings, {'fan': machine}, tell=told.append)
+    log.show(predicted(machine, [300.0]))
+    log.flush()
+    log.close()
+    assert told == ['nobody listens at rerun+http://127.0.0.1:9/proxy: the run is not shown live']
+
+
+def test_without_rerun_the_reason_is_told(machine, tmp_path, monkeypatch):
+    monkeypatch.setattr('rotorsoil_ros.live.run_log.find_spec', lambda name: None)
+    with pytest.raises(InputError, match='rerun-sdk is not installed'):
+        open_viewer(tmp_path / 'run.rrd', {'fan': machine})
