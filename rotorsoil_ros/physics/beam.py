@@ -1,4 +1,4 @@
-"""Which matrices does a piece of turning shaft have, in one plane?"""
+"""The matrices that a piece of turning shaft has in one plane."""
 
 from dataclasses import dataclass
 import math

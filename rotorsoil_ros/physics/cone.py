@@ -1,4 +1,4 @@
-"""How does soil under a rigid base give way, when it is pictured as truncated cones?"""
+"""How soil under a rigid base gives way, pictured as truncated cones."""
 
 from dataclasses import dataclass
 import math
@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.physics.soil import Contact, Soil, equivalent_radii
+from rotorsoil_ros.physics.soil import Contact, equivalent_radii, Soil
 
 # Above this Poisson's ratio waves at c_p would radiate too much: c = 2 c_s and a trapped mass.
 _NEARLY_INCOMPRESSIBLE = 1.0 / 3.0

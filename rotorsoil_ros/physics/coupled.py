@@ -1,17 +1,19 @@
-"""How does a rotor vibrate on blocks that stand on soil?"""
+"""How a rotor vibrates on blocks that stand on soil."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+import math
 
 import numpy as np
 
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.coupling import Answer, answer
 from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.prediction import Prediction
+from rotorsoil_ros.physics.prediction import FrequencyResponse, Prediction
 from rotorsoil_ros.physics.rotor import Rotor
-from rotorsoil_ros.physics.soil import DOFS, SoilModel
+from rotorsoil_ros.physics.soil import DOFS, require, SoilModel
 from rotorsoil_ros.physics.support import Support
 from rotorsoil_ros.physics.whirl import WhirlModes
 
@@ -34,14 +36,21 @@ class CoupledModel:
         What turns.
     foundations, soil_models : equally long sequences
         Blocks and the soil under each; bearings without a block stand on firm ground.
+    couples : sequence of str
+        Discs whose unbalance is also a couple: each is a plane of its own.
 
     """
 
     rotor: Rotor
     foundations: Sequence[Foundation] = ()
     soil_models: Sequence[SoilModel] = ()
+    couples: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        discs = [disc.name for disc in self.rotor.discs]
+        for name in self.couples:
+            if name not in discs:
+                raise RotorSoilError(f'couples must be on discs, {", ".join(discs)}, got {name}')
         repeated = {name for name in self.channels if self.channels.count(name) > 1}
         if repeated:
             raise RotorSoilError(f'names must differ between stations, got {min(repeated)} twice')
@@ -79,15 +88,14 @@ class CoupledModel:
 
     @property
     def planes(self) -> tuple[str, ...]:
-        """Names of the discs, which are the unbalance planes."""
-        return tuple(disc.name for disc in self.rotor.discs)
+        """Names of the unbalance planes: the discs, then couples as `<disc>_couple`."""
+        return (*(disc.name for disc in self.rotor.discs),
+                *(f'{name}_couple' for name in self.couples))
 
     @cached_property
     def nominal_springs(self) -> FloatArray:
         """Isotropic stiffness that stands in for each bearing in the rotor's modes [N/m]."""
-        still = np.zeros(1)
-        own = [np.abs(np.diagonal(bearing.dynamic_stiffness(still, still)[0])).mean()
-               for bearing in self.rotor.bearings]
+        own = [bearing.nominal_stiffness for bearing in self.rotor.bearings]
         # A bearing that is only a damper still has to hold the shaft in the modes.
         shaft, _, _ = self.rotor.plane_matrices
         least = 1e-3 * shaft.diagonal()[::2].max()
@@ -96,7 +104,9 @@ class CoupledModel:
     @cached_property
     def _ports(self) -> list[int]:
         rotor = self.rotor
-        return [2 * rotor.node_of(station.position) for station in rotor.stations]
+        places = {disc.name: 2 * rotor.node_of(disc.position) for disc in rotor.discs}
+        return [*(2 * rotor.node_of(station.position) for station in rotor.stations),
+                *(places[name] + 1 for name in self.couples)]
 
     @cached_property
     def _synchronous_modes(self) -> WhirlModes:
@@ -111,7 +121,7 @@ class CoupledModel:
         speed : (n,) float array
             Rotor speed [rad/s], which is also the excitation frequency.
         unbalance : (p,) complex array
-            moment * exp(i phase) of every plane [kg m].
+            moment * exp(i phase) of every plane [kg m], of couples [kg m^2].
 
         Returns
         -------
@@ -131,12 +141,86 @@ class CoupledModel:
 
     @cached_property
     def plane_forces(self) -> ComplexArray:
-        """Port forces per unit unbalance of each plane and squared speed, (2 p, planes)."""
-        first = len(self.rotor.bearings)
+        """
+        Port forces per unit unbalance of each plane and squared speed, (2 p, planes).
+
+        A couple of moment m e d is an unbalance m e half of d toward +y and its opposite half of
+        d toward -y. In the plane of z it exerts the couple d F_z about +x, in the plane of x the
+        couple d F_x about -z: on the slopes what an unbalance exerts on the deflections.
+        """
+        discs = len(self.rotor.discs)
+        first = [len(self.rotor.bearings), len(self.rotor.stations) - discs]
         forces = np.zeros((len(self._ports), 2, len(self.planes)), dtype=complex)
         for plane in range(len(self.planes)):
-            forces[first + plane, :, plane] = UNBALANCE_FORCE
+            forces[first[plane >= discs] + plane, :, plane] = UNBALANCE_FORCE
         return forces.reshape(-1, len(self.planes))
+
+    def frequency_response(
+        self, omega: FloatArray, *, speed: float, channel: str,
+    ) -> FrequencyResponse:
+        """
+        Solve for the response to a unit harmonic force while the rotor turns at fixed speed.
+
+        Parameters
+        ----------
+        omega : (n,) float array
+            Excitation frequency [rad/s].
+        speed : float
+            Rotor speed [rad/s], 0 for an impact test at rest.
+        channel : str
+            Where and in which direction the force acts, one of `channels`: 1 N, or 1 N m about
+            an axis of a foundation.
+
+        Raises
+        ------
+        NotSolvedError
+            If the system is singular: an undamped resonance is hit.
+
+        """
+        omega = np.asarray(omega, dtype=float)
+        modes = WhirlModes.at(self.rotor, self._ports, springs=self.nominal_springs, speed=speed)
+        return self._forced(modes, omega, np.full(len(omega), float(speed)), channel)
+
+    def harmonic_response(
+        self, speed: FloatArray, *, order: float, channel: str,
+    ) -> FrequencyResponse:
+        """
+        Solve for the response to a unit harmonic force at a multiple of the speed.
+
+        Parameters
+        ----------
+        speed : (n,) float array
+            Rotor speed [rad/s]: it sets gyroscopic couples and the tables of bearings.
+        order : float
+            Excitation frequency over speed: it sets inertia, damping and soil.
+        channel : str
+            As in `frequency_response`.
+
+        """
+        require(0.0 < order < math.inf, 'order', '> 0 and finite', order)
+        speed = np.asarray(speed, dtype=float)
+        modes = WhirlModes.of(self.rotor, self._ports, springs=self.nominal_springs, order=order)
+        return self._forced(modes, order * speed, speed, channel)
+
+    def _forced(
+        self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, channel: str,
+    ) -> FrequencyResponse:
+        if channel not in self.channels:
+            raise RotorSoilError(f'force must act at one of {", ".join(self.channels)}, '
+                                 f'got {channel}')
+        load = np.zeros((len(self.channels), 1), dtype=complex)
+        load[self.channels.index(channel)] = 1.0
+        displacement, force = self._respond(modes, omega, speed, self._sorted(load))
+        return FrequencyResponse(speed, omega, displacement[..., 0], force[..., 0])
+
+    def _sorted(self, loads: ComplexArray) -> ComplexArray:
+        """Put loads on the channels, (c, k), into the order of ports, housings and blocks."""
+        bearings = 4 * len(self.rotor.bearings)
+        blocks = len(loads) - 6 * len(self.foundations)
+        seats = loads[:bearings].reshape(-1, 2, 2, loads.shape[1])
+        journal, housing = (seats[:, part].reshape(-1, loads.shape[1]) for part in (0, 1))
+        slopes = np.zeros((2 * len(self.couples), loads.shape[1]))
+        return np.concatenate([journal, loads[bearings:blocks], slopes, housing, loads[blocks:]])
 
     def synchronous_response(
         self, speed: FloatArray, loads: ComplexArray,
@@ -149,7 +233,8 @@ class CoupledModel:
         speed : (n,) float array
             Rotor speed and excitation frequency [rad/s].
         loads : (2 p, k) complex array
-            Columns of forces over (x, z) of the ports: bearings, discs, probes [N].
+            Columns of forces over (x, z) of the ports: bearings, discs, probes [N], then of
+            couples on the slopes of discs [N m].
 
         Returns
         -------
@@ -158,81 +243,57 @@ class CoupledModel:
 
         """
         speed = np.asarray(speed, dtype=float)
-        shape = (len(speed), len(self.channels), loads.shape[1])
+        return self._respond(self._synchronous_modes, speed, speed, self._on_rotor(loads))
+
+    def _on_rotor(self, loads: ComplexArray) -> ComplexArray:
+        """Extend loads on the ports by none on housings and blocks."""
+        below = 2 * len(self.rotor.bearings) + 6 * len(self.foundations)
+        return np.concatenate([loads, np.zeros((below, loads.shape[1]))])
+
+    def _respond(
+        self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, loads: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Solve, some frequencies at a time, and sort by channel: (n, c, k) each."""
+        shape = (len(omega), len(self.channels), loads.shape[1])
         displacement = np.empty(shape, dtype=complex)
         force = np.full(shape, complex(np.nan, np.nan))
-        for start in range(0, len(speed), _CHUNK):
+        for start in range(0, len(omega), _CHUNK):
             chunk = slice(start, start + _CHUNK)
-            displacement[chunk], force[chunk][:, self.transmits_force] = self._solve(
-                speed[chunk], loads)
+            found = answer(
+                modes.receptance(omega[chunk]), self.support.standing(omega[chunk]), loads,
+                bearings=self.bearing_stiffness(omega[chunk], speed[chunk]),
+                springs=np.repeat(self.nominal_springs, 2))
+            displacement[chunk], force[chunk][:, self.transmits_force] = self._arrange(found)
         if not np.all(np.isfinite(displacement)):
             raise NotSolvedError('the coupled system has no finite solution')
         return displacement, force
 
-    def _solve(
-        self, speed: FloatArray, loads: ComplexArray,
-    ) -> tuple[ComplexArray, ComplexArray]:
-        rotor = self._synchronous_modes.receptance(speed)
-        blocks = self.support.blocks(speed)
-        seats = self.support.seats(blocks)
-        journals = slice(0, 2 * len(self.rotor.bearings))
-
-        bearings = self.bearing_stiffness(speed, speed)
-        springs = np.repeat(self.nominal_springs, 2)
-        # Through the bearings f = Z (x_journal - seats f); what the springs in the rotor's
-        # modes have not yet taken, g = f - k0 x_journal, obeys  A g = (Z - A k0) x_journal.
-        a = np.eye(len(springs)) + bearings @ seats
-        w = bearings - a * springs
-        free = rotor.regular @ loads
-        near = rotor.shapes[:, journals]
-        adjoint = rotor.shapes.conj().transpose(0, 2, 1)
-        count = len(springs)
-        size = count + near.shape[2]
-        system = np.zeros((len(speed), size, size), dtype=complex)
-        system[:, :count, :count] = a + w @ rotor.regular[:, journals, journals]
-        system[:, :count, count:] = -w @ near
-        system[:, count:, :count] = adjoint[:, :, journals]
-        system[:, range(count, size), range(count, size)] = rotor.stiffness
-        right = np.concatenate([w @ free[:, journals], adjoint @ loads], axis=1)
-        try:
-            solution = np.linalg.solve(system, right)
-        except np.linalg.LinAlgError as error:
-            raise NotSolvedError('the coupled system is singular: a resonance without damping '
-                                 'is hit') from error
-        residual, amplitude = solution[:, :count], solution[:, count:]
-        ports = free - rotor.regular[:, :, journals] @ residual + rotor.shapes @ amplitude
-        through = residual + springs[:, None] * ports[:, journals]
-        return self._arrange(speed, ports, through, blocks, seats)
-
-    def _arrange(
-        self, speed: FloatArray, ports: ComplexArray, through: ComplexArray,
-        blocks: ComplexArray, seats: ComplexArray,
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Put port motion, bearing forces and block motion into the order of the channels."""
-        length, _, columns = ports.shape
-        bearings = len(self.rotor.bearings)
+    def _arrange(self, found: Answer) -> tuple[ComplexArray, ComplexArray]:
+        """Put the answer into the order of the channels."""
+        length, _, columns = found.ports.shape
+        bearings, stations = len(self.rotor.bearings), len(self.rotor.stations)
         pairs = (length, bearings, 2, columns)
 
         def interleave(journal: ComplexArray, housing: ComplexArray) -> ComplexArray:
             both = np.stack([journal.reshape(pairs), housing.reshape(pairs)], axis=2)
             return both.reshape(length, 4 * bearings, columns)
 
-        motion = self.support.block_motion(blocks, through)
-        into_soil = self.support.soil_force(speed, motion=motion, seat_force=through)
-
-        def flat(block: ComplexArray) -> ComplexArray:
-            return block.transpose(1, 0, 2, 3).reshape(length, -1, columns)
-
         displacement = np.concatenate([
-            interleave(ports[:, :2 * bearings], seats @ through),
-            ports[:, 2 * bearings:], flat(motion)], axis=1)
-        return displacement, np.concatenate([interleave(through, through), flat(into_soil)],
-                                            axis=1)
+            interleave(found.ports[:, :2 * bearings], found.housings),
+            found.ports[:, 2 * bearings:2 * stations], found.blocks], axis=1)
+        return displacement, np.concatenate([
+            interleave(found.through, found.through), found.into_soil], axis=1)
+
+    def bearing_coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return stiffness and damping of all bearings, (n, 2 b, 2 b) over (x, z) of each."""
+        size = 2 * len(self.rotor.bearings)
+        stiffness, damping = (np.zeros((len(speed), size, size)) for _ in range(2))
+        for index, bearing in enumerate(self.rotor.bearings):
+            pair = slice(2 * index, 2 * index + 2)
+            stiffness[:, pair, pair], damping[:, pair, pair] = bearing.coefficients(speed)
+        return stiffness, damping
 
     def bearing_stiffness(self, omega: FloatArray, speed: FloatArray) -> ComplexArray:
         """Return the dynamic stiffness of all bearings, (n, 2 b, 2 b) over (x, z) of each."""
-        bearings = self.rotor.bearings
-        stiffness = np.zeros((len(omega), len(bearings), 2, len(bearings), 2), dtype=complex)
-        for index, bearing in enumerate(bearings):
-            stiffness[:, index, :, index] = bearing.dynamic_stiffness(omega, speed)
-        return stiffness.reshape(len(omega), 2 * len(bearings), 2 * len(bearings))
+        stiffness, damping = self.bearing_coefficients(speed)
+        return np.asarray(stiffness + 1j * omega[:, None, None] * damping)

@@ -1,10 +1,13 @@
-"""What does the plain assembled system say? The oracle of the fast solve."""
+"""What the plain assembled system says: the oracle of the fast solves."""
+
+from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.physics.coupled import UNBALANCE_FORCE, CoupledModel
-from rotorsoil_ros.physics.prediction import Prediction
+from rotorsoil_ros.physics.coupled import CoupledModel, UNBALANCE_FORCE
+from rotorsoil_ros.physics.prediction import FrequencyResponse, Prediction
 from rotorsoil_ros.physics.rotor import Rotor
 
 
@@ -39,7 +42,7 @@ def dense_response(
     model: CoupledModel, speed: FloatArray, unbalance: ComplexArray,
 ) -> Prediction:
     """
-    Assemble rotor and blocks and solve at every speed: slow, and easy to believe.
+    Solve for the response to unbalance as `CoupledModel.unbalance_response` does.
 
     Parameters
     ----------
@@ -48,74 +51,192 @@ def dense_response(
     speed : (n,) float array
         Rotor speed [rad/s].
     unbalance : (p,) complex array
-        moment * exp(i phase) of every plane [kg m].
+        moment * exp(i phase) of every disc [kg m], then of couples [kg m^2].
+
+    """
+    rotor = model.rotor
+    places = {disc.name: 4 * rotor.node_of(disc.position) for disc in rotor.discs}
+    system = _System.of(model, speed, speed)
+    load = np.zeros(system.matrix.shape[:2], dtype=complex)
+    square = speed[:, None] ** 2
+    for disc, moment in zip(rotor.discs, unbalance, strict=False):
+        node = places[disc.name]
+        load[:, node:node + 2] += moment * square * UNBALANCE_FORCE
+    for name, couple in zip(model.couples, unbalance[len(rotor.discs):], strict=True):
+        # Forces F and -F an arm d apart along y exert M = r x F = d (F_z, 0, -F_x).
+        x, z = UNBALANCE_FORCE * couple
+        load[:, places[name] + 2:places[name] + 4] += square * np.array([z, -x])
+    return Prediction(speed, *system.solve(load))
+
+
+def dense_forced(
+    model: CoupledModel, omega: FloatArray, speed: FloatArray, channel: str,
+) -> FrequencyResponse:
+    """
+    Solve for the response to a unit force at a channel.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    omega, speed : (n,) float arrays
+        Excitation frequency and rotor speed [rad/s].
+    channel : str
+        Where the force acts; a housing needs a pedestal of its own.
+
+    """
+    system = _System.of(model, omega, speed)
+    # A unit force does unit work on the motion that it drives.
+    place = system.channels[model.channels.index(channel)]
+    load = np.repeat(place[None].astype(complex), len(omega), axis=0)
+    blocks = slice(system.rotor_size, system.rotor_size + 6 * len(model.foundations))
+    load[:, blocks] = (system.compliances @ load[:, blocks, None])[..., 0]
+    displacement, force = system.solve(load)
+    first = 4 * len(model.rotor.bearings) + 2 * (len(model.rotor.discs) + len(model.rotor.probes))
+    force[:, first:] += place[blocks]
+    return FrequencyResponse(speed, omega, displacement, force)
+
+
+def dense_eigenvalues(
+    model: CoupledModel, speed: float, *, stiffness: FloatArray, damping: FloatArray,
+) -> ComplexArray:
+    """
+    Return all eigenvalues that vibrate, of a support of springs and dashpots.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine; its soil models are not asked.
+    speed : float
+        Rotor speed [rad/s].
+    stiffness, damping : (s, s) float array
+        Of the support over `Support.motion_rows`: springs [N/m], dashpots [N s/m].
 
     Returns
     -------
-    Prediction
-        As `CoupledModel.unbalance_response`.
-
-    Notes
-    -----
-    Unknowns are all rotor dofs X and, for each block, its motion q. The rows of q read
-    (I - omega^2 N M) q - N T^T f = 0, so that a rigid soil (N = 0) needs no case of its own.
+    (m,) complex array
+        lambda with positive imaginary part, rising with it [rad/s].
 
     """
     rotor, support = model.rotor, model.support
-    stiffness, mass, gyroscopic = rotor_matrices(rotor)
-    size, blocks = len(stiffness), 6 * len(model.foundations)
-    journals = np.zeros((2 * len(rotor.bearings), size))
-    for index, bearing in enumerate(rotor.bearings):
-        for axis in range(2):
-            journals[2 * index + axis, 4 * rotor.node_of(bearing.position) + axis] = 1.0
-    seats = support.seat_rows.transpose(1, 0, 2).reshape(-1, blocks)
-    relative = np.concatenate([journals, -seats], axis=1)
-
-    omega = speed[:, None, None]
-    through = model.bearing_stiffness(speed, speed) @ relative
-    system = np.zeros((len(speed), size + blocks, size + blocks), dtype=complex)
-    system[:, :size, :size] = stiffness - omega**2 * mass + 1j * omega**2 * gyroscopic
-    system[:, :size] += journals.T @ through
-    for index, (foundation, soil) in enumerate(
-            zip(model.foundations, model.soil_models, strict=True)):
-        rows = slice(size + 6 * index, size + 6 * index + 6)
-        compliance = soil.compliance(speed)
-        system[:, rows, rows] = np.eye(6) - omega**2 * (compliance @ foundation.mass_matrix)
-        own_seats = seats[:, 6 * index:6 * index + 6]
-        system[:, rows] -= compliance @ own_seats.T @ through
-
-    load = np.zeros((len(speed), size + blocks), dtype=complex)
-    for disc, moment in zip(rotor.discs, unbalance, strict=True):
-        node = 4 * rotor.node_of(disc.position)
-        load[:, node:node + 2] += moment * speed[:, None] ** 2 * UNBALANCE_FORCE
-    motion = np.linalg.solve(system, load[..., None])[..., 0]
-    return _channels_of(model, speed, motion, through, seats)
+    shaft, mass, gyroscopic = rotor_matrices(rotor)
+    journals = _System.journals_of(rotor)
+    relative = np.concatenate([journals, -support.motion_rows], axis=1)
+    springs, dampers = model.bearing_coefficients(np.array([speed]))
+    k = scipy.linalg.block_diag(shaft, stiffness) + relative.T @ springs[0] @ relative
+    c = scipy.linalg.block_diag(speed * gyroscopic, damping) + relative.T @ dampers[0] @ relative
+    m = scipy.linalg.block_diag(mass, support.motion_mass)
+    # In units of time in which stiffness and mass are alike: digits.
+    unit = np.sqrt(np.linalg.norm(k) / np.linalg.norm(m)) ** 0.5
+    size, one = len(k), np.eye(len(k))
+    values = unit * scipy.linalg.eigvals(
+        np.block([[np.zeros((size, size)), one], [-k / unit**2, -c / unit]]),
+        scipy.linalg.block_diag(one, m))
+    values = values[np.isfinite(values) & (values.imag > 1e-9 * np.abs(values))]
+    return np.asarray(values[np.argsort(values.imag)])
 
 
-def _channels_of(
-    model: CoupledModel, speed: FloatArray, motion: ComplexArray, through: ComplexArray,
-    seats: FloatArray,
-) -> Prediction:
-    """Pick the channels out of the solution of the assembled system."""
-    rotor = model.rotor
-    size = motion.shape[1] - seats.shape[1]
-    block = motion[:, size:]
-    forces = (through @ motion[..., None])[..., 0]
-    housings = block @ seats.T
-    displacement, force = [], []
-    for index, bearing in enumerate(rotor.bearings):
-        node = 4 * rotor.node_of(bearing.position)
-        pair = slice(2 * index, 2 * index + 2)
-        displacement += [motion[:, node:node + 2], housings[:, pair]]
-        force += [forces[:, pair], forces[:, pair]]
-    for station in rotor.stations[len(rotor.bearings):]:
-        node = 4 * rotor.node_of(station.position)
-        displacement.append(motion[:, node:node + 2])
-        force.append(np.full((len(speed), 2), complex(np.nan, np.nan)))
-    into_soil = forces @ seats
-    for index, foundation in enumerate(model.foundations):
-        rows = slice(6 * index, 6 * index + 6)
-        displacement.append(block[:, rows])
-        force.append(into_soil[:, rows]
-                     + speed[:, None] ** 2 * (block[:, rows] @ foundation.mass_matrix))
-    return Prediction(speed, np.concatenate(displacement, axis=1), np.concatenate(force, axis=1))
+@dataclass(frozen=True)
+class _System:
+    """
+    Assembled equations at some frequencies.
+
+    Unknowns are all rotor dofs X, the motion q of each block and that of each housing on a
+    pedestal. The rows of q read (I - omega^2 N M) q - N T^T f = 0, so that a rigid soil (N = 0)
+    needs no case of its own.
+    """
+
+    model: CoupledModel
+    omega: FloatArray
+    matrix: ComplexArray
+    through: ComplexArray
+    into_seats: ComplexArray
+    housings: FloatArray
+    compliances: ComplexArray
+
+    @staticmethod
+    def journals_of(rotor: Rotor) -> FloatArray:
+        """Return the rows that pick (x, z) of every journal out of the rotor's dofs."""
+        rows = np.zeros((2 * len(rotor.bearings), 4 * len(rotor.node_positions)))
+        for index, bearing in enumerate(rotor.bearings):
+            for axis in range(2):
+                rows[2 * index + axis, 4 * rotor.node_of(bearing.position) + axis] = 1.0
+        return rows
+
+    @property
+    def rotor_size(self) -> int:
+        """Number of dofs of the rotor."""
+        return 4 * len(self.model.rotor.node_positions)
+
+    @classmethod
+    def of(cls, model: CoupledModel, omega: FloatArray, speed: FloatArray) -> '_System':
+        """Assemble."""
+        rotor, support = model.rotor, model.support
+        stiffness, mass, gyroscopic = rotor_matrices(rotor)
+        size, blocks = len(stiffness), 6 * len(model.foundations)
+        own = [index for index, bearing in enumerate(rotor.bearings) if bearing.pedestal]
+        total = size + blocks + 2 * len(own)
+        journals = np.concatenate([cls.journals_of(rotor), np.zeros((2 * len(rotor.bearings),
+                                                                     total - size))], axis=1)
+        seats = np.zeros_like(journals)
+        seats[:, size:size + blocks] = support.seat_rows.transpose(1, 0, 2).reshape(-1, blocks)
+        housings = seats.copy()
+        for place, index in enumerate(own):
+            housings[2 * index:2 * index + 2] = 0.0
+            for axis in range(2):
+                housings[2 * index + axis, size + blocks + 2 * place + axis] = 1.0
+
+        square = omega[:, None, None] ** 2
+        through = model.bearing_stiffness(omega, speed) @ (journals - housings)
+        into_seats = through.copy()
+        matrix = np.zeros((len(omega), total, total), dtype=complex)
+        matrix[:, :size, :size] = (stiffness - square * mass
+                                   + 1j * (omega * speed)[:, None, None] * gyroscopic)
+        matrix += journals.T @ through
+        for place, index in enumerate(own):
+            pedestal, pair = rotor.bearings[index].pedestal, slice(2 * index, 2 * index + 2)
+            assert pedestal is not None
+            spring = pedestal.stiffness + 1j * omega[:, None, None] * pedestal.damping
+            into_seats[:, pair] = spring @ (housings - seats)[pair]
+            row = slice(size + blocks + 2 * place, size + blocks + 2 * place + 2)
+            matrix[:, row] += into_seats[:, pair] - through[:, pair]
+            matrix[:, row, row] -= square * pedestal.mass
+        compliances = np.zeros((len(omega), blocks, blocks), dtype=complex)
+        for index, (foundation, soil) in enumerate(
+                zip(model.foundations, model.soil_models, strict=True)):
+            part = slice(6 * index, 6 * index + 6)
+            rows = slice(size + part.start, size + part.stop)
+            compliance = compliances[:, part, part] = soil.compliance(omega)
+            matrix[:, rows, rows] += np.eye(6) - square * (compliance @ foundation.mass_matrix)
+            matrix[:, rows] -= compliance @ seats[:, rows].T @ into_seats
+        return cls(model, omega, matrix, through, into_seats, housings, compliances)
+
+    @property
+    def channels(self) -> FloatArray:
+        """Rows that pick the channels out of the unknowns."""
+        rotor, size, total = self.model.rotor, self.rotor_size, self.matrix.shape[1]
+        unit = np.eye(total)
+        rows: list[FloatArray] = []
+        for index, bearing in enumerate(rotor.bearings):
+            node = 4 * rotor.node_of(bearing.position)
+            rows += [unit[node:node + 2], self.housings[2 * index:2 * index + 2]]
+        for station in rotor.stations[len(rotor.bearings):]:
+            node = 4 * rotor.node_of(station.position)
+            rows.append(unit[node:node + 2])
+        rows.append(unit[size:size + 6 * len(self.model.foundations)])
+        return np.concatenate(rows)
+
+    def solve(self, load: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return displacement and force of every channel, (n, c) each."""
+        model = self.model
+        motion = np.linalg.solve(self.matrix, load[..., None])
+        through, seats = (self.through @ motion)[..., 0], (self.into_seats @ motion)[..., 0]
+        blocks = motion[:, self.rotor_size:, 0]
+        forces = [np.repeat(through.reshape(len(load), -1, 1, 2), 2, axis=2).reshape(len(load), -1)]
+        others = 2 * (len(model.rotor.discs) + len(model.rotor.probes))
+        forces.append(np.full((len(load), others), complex(np.nan, np.nan)))
+        for index, foundation in enumerate(model.foundations):
+            own = blocks[:, 6 * index:6 * index + 6]
+            forces.append(seats @ model.support.seat_rows[index]
+                          + self.omega[:, None] ** 2 * (own @ foundation.mass_matrix))
+        return ((self.channels @ motion)[..., 0], np.concatenate(forces, axis=1))

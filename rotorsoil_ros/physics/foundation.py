@@ -1,4 +1,4 @@
-"""How does a rigid block on the soil move under the bearings that stand on it?"""
+"""How a rigid block on the soil moves under the bearings that stand on it."""
 
 from dataclasses import dataclass
 import math
@@ -28,6 +28,8 @@ class Foundation:
         z_c above the contact plane [m].
     inertia : tuple of three floats
         Moments of inertia about the centre of gravity, axes x, y, z [kg m^2].
+    height : float or None
+        Of the block above the contact plane [m]; nothing but pictures depends on it.
 
     """
 
@@ -37,15 +39,25 @@ class Foundation:
     mass: float
     centre_of_gravity_height: float
     inertia: tuple[float, float, float]
+    height: float | None = None
 
     def __post_init__(self) -> None:
         require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)
         require(math.isfinite(self.centre_y), 'centre_y', 'finite, in m', self.centre_y)
         require(math.isfinite(self.centre_of_gravity_height), 'centre_of_gravity_height',
                 'finite, in m', self.centre_of_gravity_height)
+        if self.height is not None:
+            require(0.0 < self.height < math.inf, 'height', '> 0 m and finite', self.height)
         for axis, value in zip('xyz', self.inertia, strict=True):
             require(0.0 <= value < math.inf, f'inertia about {axis}', '>= 0 kg m^2 and finite',
                     value)
+
+    @property
+    def drawn_height(self) -> float:
+        """Height of the block in pictures [m]: a uniform block's unless it is given."""
+        if self.height is not None:
+            return self.height
+        return 2.0 * max(self.centre_of_gravity_height, 0.05 * self.contact.characteristic_length)
 
     @property
     def mass_matrix(self) -> FloatArray:
@@ -106,5 +118,12 @@ def add_mass(compliance: ComplexArray, mass: FloatArray, omega: FloatArray) -> C
 
     """
     # Not (N^-1 - w^2 M)^-1: a rigid base has N = 0 and no inverse.
-    inertia = np.eye(len(mass)) - omega[:, None, None] ** 2 * (compliance @ mass)
-    return np.linalg.solve(inertia, compliance)
+    return np.linalg.solve(carrying(compliance, mass, omega), compliance)
+
+
+def carrying(compliance: ComplexArray, mass: FloatArray, omega: FloatArray) -> ComplexArray:
+    """Return I - omega^2 N M, (n, d, d): what a mass makes of a compliance's motion [-]."""
+    size = len(mass)
+    # One product of tall matrices instead of many small ones.
+    carried = (compliance.reshape(-1, size) @ mass).reshape(-1, size, size)
+    return np.asarray(np.eye(size) - omega[:, None, None] ** 2 * carried)

@@ -1,4 +1,4 @@
-"""Which unbalance, and which soil or bearing, explains a measured run best?"""
+"""The unbalance, and the soil or bearing, that explain a measured run best."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -105,7 +105,7 @@ def identify_unbalance(unit_response: ComplexArray, measured: ComplexArray) -> U
     moment, *_ = np.linalg.lstsq(system, right, rcond=None)
     residual = right - system @ moment
     variance = np.vdot(residual, residual).real / (2 * (len(right) - planes))
-    covariance = np.linalg.pinv((system.conj().T @ system))
+    covariance = np.linalg.pinv(system.conj().T @ system)
     return Unbalance(
         moment, np.sqrt(variance * np.diagonal(covariance).real), condition,
         float(1.0 - np.vdot(residual, residual).real / np.vdot(right, right).real))

@@ -1,4 +1,4 @@
-"""Which once-per-turn vector is in a measured signal?"""
+"""The once-per-turn vector that is in a measured signal."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

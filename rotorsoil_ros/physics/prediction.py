@@ -1,4 +1,4 @@
-"""What does a coupled model answer?"""
+"""What a coupled model answers."""
 
 from dataclasses import dataclass
 
@@ -30,3 +30,28 @@ class Prediction:
     def velocity(self) -> ComplexArray:
         """Velocity, i speed X, (n, c) [m/s, rad/s]."""
         return 1j * self.speed[:, None] * self.displacement
+
+
+@dataclass(frozen=True, slots=True)
+class FrequencyResponse:
+    """
+    Response of every channel to a harmonic force, complex and zero-to-peak.
+
+    Attributes
+    ----------
+    speed, omega : (n,) float arrays
+        Rotor speed and excitation frequency [rad/s].
+    displacement, force : (n, c) complex arrays
+        As in `Prediction`, per newton, or per newton metre about an axis of a foundation.
+
+    """
+
+    speed: FloatArray
+    omega: FloatArray
+    displacement: ComplexArray
+    force: ComplexArray
+
+    @property
+    def velocity(self) -> ComplexArray:
+        """Velocity, i omega X, (n, c) [m/s, rad/s]."""
+        return 1j * self.omega[:, None] * self.displacement

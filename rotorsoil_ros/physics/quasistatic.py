@@ -1,4 +1,4 @@
-"""Was the speed changed slowly enough for a steady-state prediction to hold?"""
+"""Whether the speed changed slowly enough for a steady-state prediction to hold."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

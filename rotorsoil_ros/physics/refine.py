@@ -1,17 +1,15 @@
-"""Into which pieces must a sharp function be cut so that polynomials can stand for it?"""
+"""The pieces into which a sharp function is cut so that polynomials can stand for it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 DEGREE = 7
-
-# Pieces before the first look: a resonance shows by its skirt, which must reach a point.
-_FIRST_PIECES = 32
 
 # Relative to the highest speed: a piece this short around a pole is given up. A double resolves
 # 1e-16, so that an interpolant still has seven digits there.
@@ -91,7 +89,8 @@ def evaluate(
     powers[1:] = ((place - left) - (right - place)) / (right - left)
     np.multiply.accumulate(powers, axis=0, out=powers)
     if len(place) == 1:  # the live node: no sorting, few calls
-        return np.add.reduce(powers * coefficients[index[0]], axis=0, keepdims=True)
+        terms: FloatArray = powers * coefficients[index[0]]
+        return terms.sum(axis=0, keepdims=True)
     values = np.empty((len(place), coefficients.shape[2]))
     for piece, run in _runs(index):
         values[run] = _sum(powers[:, run, None], coefficients[piece])
@@ -112,13 +111,13 @@ def _runs(index: IntArray) -> Iterator[tuple[int, IntArray]]:
     """Yield each piece once, with the places that lie in it."""
     order = np.argsort(index, kind='stable')
     ends = np.flatnonzero(np.diff(index[order], prepend=-1, append=-1))
-    for start, stop in zip(ends[:-1], ends[1:], strict=True):
+    for start, stop in pairwise(ends):
         run = order[start:stop]
         yield int(index[run[0]]), run
 
 
 def refine(
-    solve: Solver, low: float, high: float, *, groups: IntArray, tolerance: float,
+    solve: Solver, edges: FloatArray, *, groups: IntArray, tolerance: float,
 ) -> Pieces:
     """
     Halve pieces until polynomials through their nodes are right between the nodes.
@@ -128,8 +127,9 @@ def refine(
     solve : callable
         From places (n,) to wanted values (n, p, w) and probing values (n, q, w); the latter
         are not kept but betray resonances that hardly show in the former.
-    low, high : float
-        Ends of the range.
+    edges : (k + 1,) float array
+        Ends of the pieces before the first look, ascending: a resonance shows by its skirt,
+        which must reach into each.
     groups : (w,) int array
         Columns of one kind and unit have the same number: the largest of them tells what is
         round-off in the others.
@@ -146,8 +146,7 @@ def refine(
     along = -np.cos(np.pi * np.arange(2 * DEGREE + 1) / (2 * DEGREE))
     powers = np.linalg.inv(np.vander(along[::2], DEGREE + 1, increasing=True))
     between = np.vander(along[1::2], DEGREE + 1, increasing=True) @ powers
-    open_edges = np.linspace(low, high, _FIRST_PIECES + 1)
-    left, right = open_edges[:-1], open_edges[1:]
+    left, right, high = edges[:-1], edges[1:], edges[-1]
     done: list[tuple[FloatArray, FloatArray, BoolArray, ComplexArray]] = []
     while len(left):
         middle, half = 0.5 * (left + right), 0.5 * (right - left)

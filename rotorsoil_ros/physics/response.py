@@ -1,4 +1,4 @@
-"""What does the machine answer at any speed, without solving again?"""
+"""What the machine answers at any speed, without solving again."""
 
 from dataclasses import dataclass, replace
 
@@ -8,14 +8,17 @@ from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.physics.prediction import Prediction
-from rotorsoil_ros.physics.refine import Pieces, evaluate, refine
+from rotorsoil_ros.physics.refine import evaluate, Pieces, refine
 from rotorsoil_ros.physics.units import rad_s_to_rpm
 
-__all__ = ['Prediction', 'Predictor', 'ResponseTable', 'TOLERANCE']
+__all__ = ['TOLERANCE', 'Prediction', 'Predictor', 'ResponseTable']
 
 # Relative to the local amplitude, at the points checked while refining; ten times sharper than
 # what is promised at any speed.
 TOLERANCE = 1e-5
+
+# Pieces before the first refinement.
+_FIRST_PIECES = 32
 
 # Samples evaluated together: many share a piece, and they stay in the processor's cache.
 _BLOCK = 8192
@@ -97,7 +100,8 @@ class ResponseTable:
             columns = rows.transpose(0, 2, 1)
             return columns[:, :planes], columns[:, planes:]
 
-        pieces = refine(solve, low, high, groups=model.groups, tolerance=tolerance)
+        edges = np.linspace(low, high, _FIRST_PIECES + 1)
+        pieces = refine(solve, edges, groups=model.groups, tolerance=tolerance)
         if not np.any(pieces.resolved):
             raise NotSolvedError('no part of the speed range could be interpolated')
         table = cls(model.channels, model.planes, model.transmits_force, pieces, np.nan)
@@ -129,7 +133,12 @@ class ResponseTable:
             raise RotorSoilError(f'unbalance must be {len(self.planes)} finite complex moments '
                                  f'in kg m, got {unbalance}')
         weighted = np.einsum('kdpc,p->kdc', self.pieces.coefficients, unbalance)
-        return Predictor(self, np.ascontiguousarray(weighted).view(float))
+        moving = len(self.channels)
+        # NaN where no force is transmitted: it stays NaN in every sum, at no further cost.
+        coefficients = np.full((*weighted.shape[:2], 2 * moving), complex(np.nan, np.nan))
+        coefficients[..., :moving] = weighted[..., :moving]
+        coefficients[..., moving:][..., self.transmits_force] = weighted[..., moving:]
+        return Predictor(self, coefficients.view(float))
 
     def measure(self, model: CoupledModel) -> float:
         """Return the largest deviation from the exact solution at speeds not yet seen."""
@@ -182,7 +191,7 @@ class Predictor:
     ----------
     table : ResponseTable
         What is looked up.
-    coefficients : (k, degree + 1, 2 w) float array
+    coefficients : (k, degree + 1, 4 c) float array
         Real and imaginary parts of all channels, then of all forces.
 
     """
@@ -226,13 +235,12 @@ class Predictor:
             raise OutOfTableError(
                 f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and '
                 f'off undamped resonances, got {rad_s_to_rpm(float(speed[index < 0][0])):g} rpm')
-        rows = np.empty((len(speed), self.coefficients.shape[2]))
-        for start in range(0, len(speed), _BLOCK):
-            block = slice(start, start + _BLOCK)
-            rows[block] = evaluate(
-                self.table.pieces, self.coefficients, speed[block], index[block])
+        if len(speed) <= _BLOCK:
+            rows = evaluate(self.table.pieces, self.coefficients, speed, index)
+        else:
+            rows = np.concatenate([
+                evaluate(self.table.pieces, self.coefficients, speed[start:start + _BLOCK],
+                         index[start:start + _BLOCK]) for start in range(0, len(speed), _BLOCK)])
         response = rows.view(complex)
         moving = len(self.channels)
-        force = np.full((len(speed), moving), complex(np.nan, np.nan))
-        force[:, self.table.transmits_force] = response[:, moving:]
-        return Prediction(speed, response[:, :moving], force)
+        return Prediction(speed, response[:, :moving], response[:, moving:])

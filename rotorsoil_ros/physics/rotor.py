@@ -1,4 +1,4 @@
-"""What turns: shaft, discs and bearings, as the matrices of Lalanne and Ferraris."""
+"""What turns: shaft and discs, as the matrices of Lalanne and Ferraris."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,8 +8,11 @@ import numpy as np
 
 from rotorsoil_ros.physics.arrays import FloatArray
 from rotorsoil_ros.physics.beam import BeamElements, plane_matrices
+from rotorsoil_ros.physics.bearing import Bearing
 from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.soil import require
+
+__all__ = ['Bearing', 'Disc', 'Material', 'Probe', 'Rotor', 'ShaftSection']
 
 # Stations closer than this share of the shaft length to a node are that node.
 _SAME_NODE = 1e-9
@@ -86,44 +89,21 @@ class Disc:
         require(0.0 <= self.polar_inertia < math.inf, 'polar_inertia', '>= 0 kg m^2 and finite',
                 self.polar_inertia)
 
-
-@dataclass(frozen=True, slots=True)
-class Bearing:
-    """
-    Spring and damper between the shaft and its housing.
-
-    Attributes
-    ----------
-    name : str
-        First part of its channels.
-    position : float
-        Along the shaft [m].
-    foundation : str or None
-        Name of the block on which its housing stands; None is ground that does not move.
-    stiffness, damping : (2, 2) float array
-        Over (x, z), cross terms included [N/m], [N s/m].
-
-    """
-
-    name: str
-    position: float
-    foundation: str | None
-    stiffness: FloatArray
-    damping: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, unit in (('stiffness', 'N/m'), ('damping', 'N s/m')):
-            matrix = getattr(self, name)
-            if matrix.shape != (2, 2) or not np.all(np.isfinite(matrix)):
-                raise RotorSoilError(f'{name} must be a finite 2 x 2 matrix in {unit}, '
-                                     f'got {matrix.tolist()}')
-        if not np.any(self.stiffness) and not np.any(self.damping):
-            raise RotorSoilError('stiffness and damping must not both be zero')
-
-    def dynamic_stiffness(self, omega: FloatArray, speed: FloatArray) -> FloatArray:
-        """Return K(speed) + i omega C(speed), (n, 2, 2) complex over (x, z) [N/m]."""
-        del speed  # constant coefficients
-        return self.stiffness + 1j * omega[:, None, None] * self.damping
+    @classmethod
+    def cylinder(
+        cls, name: str, position: float, *, outer_diameter: float, inner_diameter: float,
+        width: float, density: float,
+    ) -> 'Disc':
+        """Return a homogeneous cylindrical disc by its dimensions [m] and density [kg/m^3]."""
+        require(0.0 < outer_diameter < math.inf, 'outer_diameter', '> 0 m and finite',
+                outer_diameter)
+        require(0.0 <= inner_diameter < outer_diameter, 'inner_diameter',
+                f'>= 0 m and less than the outer diameter {outer_diameter:g} m', inner_diameter)
+        require(0.0 < width < math.inf, 'width', '> 0 m and finite', width)
+        require(0.0 < density < math.inf, 'density', '> 0 kg/m^3 and finite', density)
+        mass = density * math.pi / 4.0 * (outer_diameter**2 - inner_diameter**2) * width
+        polar = mass * (outer_diameter**2 + inner_diameter**2) / 8.0
+        return cls(name, position, mass, polar / 2.0 + mass * width**2 / 12.0, polar)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,22 +1,23 @@
-"""How do the bearing housings move under the forces that the bearings put into them?"""
+"""How the bearing housings move under the forces that the bearings put into them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg
 
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.bearing import Bearing
 from rotorsoil_ros.physics.errors import RotorSoilError
-from rotorsoil_ros.physics.foundation import Foundation, add_mass
-from rotorsoil_ros.physics.rotor import Bearing
+from rotorsoil_ros.physics.foundation import carrying, Foundation
 from rotorsoil_ros.physics.soil import SoilModel
 
 
 @dataclass(frozen=True)
 class Support:
     """
-    Blocks on soil below the bearings.
+    Blocks on soil, and pedestals on them, below the bearings.
 
     Attributes
     ----------
@@ -63,32 +64,166 @@ class Support:
                         position=bearing.position, height=self.shaft_height)
         return rows
 
-    def blocks(self, omega: FloatArray) -> ComplexArray:
-        """Return the receptance of each block at its contact centre, (f, n, 6, 6) [m/N]."""
-        return np.array([
-            add_mass(model.compliance(omega), foundation.mass_matrix, omega)
-            for foundation, model in zip(self.foundations, self.soil_models, strict=True)
-        ], dtype=complex).reshape(-1, len(omega), 6, 6)
+    @cached_property
+    def pedestal_axes(self) -> list[int]:
+        """Those of the housings' (x, z) that have a pedestal of their own below them."""
+        return [2 * index + axis for index, bearing in enumerate(self.bearings)
+                if bearing.pedestal is not None for axis in range(2)]
 
-    def seats(self, blocks: ComplexArray) -> ComplexArray:
-        """Return the receptance between the seats, (n, 2 b, 2 b) over (x, z) of each [m/N]."""
-        rows = self.seat_rows
-        return np.asarray((rows[:, None] @ blocks @ rows.transpose(0, 2, 1)[:, None]).sum(axis=0))
+    @cached_property
+    def housing_mass(self) -> FloatArray:
+        """Mass of the housings over (x, z) of each, (2 b, 2 b) [kg]."""
+        own = [bearing.pedestal.mass for bearing in self.bearings if bearing.pedestal is not None]
+        total = np.zeros((2 * len(self.bearings), 2 * len(self.bearings)))
+        total[np.ix_(self.pedestal_axes, self.pedestal_axes)] = scipy.linalg.block_diag(*own)
+        return total
 
-    def block_motion(self, blocks: ComplexArray, seat_force: ComplexArray) -> ComplexArray:
-        """Return block motion, (f, n, 6, p), under forces into the seats, (n, 2 b, p) [N]."""
-        return np.asarray(blocks @ (self.seat_rows.transpose(0, 2, 1)[:, None] @ seat_force))
+    def pedestals(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of all pedestals, (n, 2 b, 2 b); zero where one is rigid."""
+        total = np.zeros((len(omega), *self.housing_mass.shape), dtype=complex)
+        for index, bearing in enumerate(self.bearings):
+            if bearing.pedestal is not None:
+                pair = slice(2 * index, 2 * index + 2)
+                total[:, pair, pair] = bearing.pedestal.compliance(omega)
+        return total
 
-    def soil_force(
-        self, omega: FloatArray, *, motion: ComplexArray, seat_force: ComplexArray,
-    ) -> ComplexArray:
+    def standing(self, omega: FloatArray) -> 'Standing':
+        """Return how the support answers forces at frequencies (n,) [rad/s]."""
+        count = 2 * len(self.bearings)
+        compliances = [model.compliance(omega) for model in self.soil_models]
+        inertias = [carrying(compliance, foundation.mass_matrix, omega) for compliance, foundation
+                    in zip(compliances, self.foundations, strict=True)]
+        per_force = [np.linalg.solve(held_back, compliance @ rows.T)
+                     for held_back, compliance, rows
+                     in zip(inertias, compliances, self.seat_rows, strict=True)]
+        deflection = self.pedestals(omega)
+        for rows, motion in zip(self.seat_rows, per_force, strict=True):
+            deflection += rows @ motion
+        held_back = carrying(deflection, self.housing_mass, omega)
+        return Standing(
+            self, omega, compliances, inertias, per_force, deflection, held_back,
+            np.linalg.solve(held_back, deflection) if self.pedestal_axes else deflection)
+
+    @cached_property
+    def motion_rows(self) -> FloatArray:
         """
-        Return the force of each block on the soil, (f, n, 6, p) [N, N m].
+        Housing motion per motion of the support, (2 b, s).
 
-        It is what enters at the seats plus the block's inertia; the compliance, which may be
-        zero, is not inverted for it.
+        The motion of the support is that of its blocks, then the deflection of its pedestals.
         """
-        masses = np.array([foundation.mass_matrix for foundation in self.foundations])
-        masses = masses.reshape(-1, 6, 6)
-        inertia = omega[:, None, None] ** 2 * (masses[:, None] @ motion)
-        return np.asarray(self.seat_rows.transpose(0, 2, 1)[:, None] @ seat_force + inertia)
+        seats = self.seat_rows.transpose(1, 0, 2).reshape(2 * len(self.bearings), -1)
+        return np.concatenate([seats, np.eye(len(seats))[:, self.pedestal_axes]], axis=1)
+
+    @cached_property
+    def motion_mass(self) -> FloatArray:
+        """Mass matrix of the motion of the support, (s, s)."""
+        rows = self.motion_rows
+        total = np.asarray(rows.T @ self.housing_mass @ rows)
+        for index, foundation in enumerate(self.foundations):
+            block = slice(6 * index, 6 * index + 6)
+            total[block, block] += foundation.mass_matrix
+        return total
+
+    def motion_compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of soils and pedestals without any mass, (n, s, s)."""
+        size, blocks = len(self.motion_mass), 6 * len(self.foundations)
+        total = np.zeros((len(omega), size, size), dtype=complex)
+        for index, model in enumerate(self.soil_models):
+            block = slice(6 * index, 6 * index + 6)
+            total[:, block, block] = model.compliance(omega)
+        axes = np.array(self.pedestal_axes, dtype=int)
+        total[:, blocks:, blocks:] = self.pedestals(omega)[:, axes[:, None], axes]
+        return total
+
+
+@dataclass(frozen=True)
+class Standing:
+    """
+    Support at some frequencies.
+
+    Attributes
+    ----------
+    support : Support
+        What it is.
+    omega : (n,) float array
+        Excitation frequency [rad/s].
+    compliances, inertias : lists of (n, 6, 6) complex arrays
+        N of each block [m/N], and I - omega^2 N M, what its mass makes of it [-].
+    per_force : list of (n, 6, 2 b) complex arrays
+        Motion of each block per force on a seat.
+    deflection, inertia : (n, 2 b, 2 b) complex arrays
+        Motion of the housings per force into their pedestals [m/N], and what their own mass
+        makes of it [-].
+    receptance : (n, 2 b, 2 b) complex array
+        Motion of the housings over (x, z) of each per force on them [m/N]: a pedestal is a
+        compliance in series with that of its seat, and it carries the housing.
+
+    """
+
+    support: Support
+    omega: FloatArray
+    compliances: list[ComplexArray]
+    inertias: list[ComplexArray]
+    per_force: list[ComplexArray]
+    deflection: ComplexArray
+    inertia: ComplexArray
+    receptance: ComplexArray
+
+    def pushed(self, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Return what moves while the bearings exert nothing.
+
+        Parameters
+        ----------
+        loads : (2 b + 6 f, k) complex array
+            Forces on the housings, then on each block [N, N m].
+
+        Returns
+        -------
+        housings (n, 2 b, k), blocks (n, 6 f, k) : complex arrays
+            Motion of the housings; that of the blocks without the housings' forces [m, rad].
+
+        """
+        count = self.receptance.shape[1]
+        if not loads.any():  # the usual case, at no cost
+            return (np.zeros((1, count, loads.shape[1]), dtype=complex),
+                    np.zeros((1, len(loads) - count, loads.shape[1]), dtype=complex))
+        on_housings, on_blocks = loads[:count], loads[count:].reshape(-1, 6, loads.shape[1])
+        blocks = [np.linalg.solve(inertia, compliance @ load) for inertia, compliance, load
+                  in zip(self.inertias, self.compliances, on_blocks, strict=True)]
+        seats = np.zeros((len(self.omega), count, loads.shape[1]), dtype=complex)
+        for rows, motion in zip(self.support.seat_rows, blocks, strict=True):
+            seats += rows @ motion
+        return (np.linalg.solve(self.inertia, seats + self.deflection @ on_housings),
+                np.concatenate([seats[:, :0], *blocks], axis=1))
+
+    def blocks(
+        self, through: ComplexArray, housings: ComplexArray, loads: ComplexArray,
+        pushed: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Return motion and soil force of the blocks, each (n, 6 f, k) [m, rad], [N, N m].
+
+        What enters the soil is the force at the seats, the load and the block's inertia; the
+        compliance, which may be zero, is not inverted for it.
+
+        Parameters
+        ----------
+        through, housings : (n, 2 b, k) complex arrays
+            Force through the bearings [N] and motion of the housings [m].
+        loads, pushed : (2 b + 6 f, k), (n, 6 f, k) complex arrays
+            As in `pushed`, and its second result.
+
+        """
+        square = self.omega[:, None, None] ** 2
+        count = through.shape[1]
+        seats = through + loads[:count] + square * (self.support.housing_mass @ housings)
+        motions, forces = [through[:, :0]], [through[:, :0]]
+        for index, (rows, per_force, foundation) in enumerate(zip(
+                self.support.seat_rows, self.per_force, self.support.foundations, strict=True)):
+            own = slice(6 * index, 6 * index + 6)
+            motion = pushed[:, own] + per_force @ seats
+            motions.append(motion)
+            forces.append(rows.T @ seats + loads[count:][own]
+                          + square * (foundation.mass_matrix @ motion))
+        return np.concatenate(motions, axis=1), np.concatenate(forces, axis=1)

@@ -1,19 +1,24 @@
-"""How does the turning rotor on plain springs answer a force, at any speed at once?"""
+"""How the turning rotor on plain springs answers a force, at any speed at once."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.physics.rotor import Rotor
 
 # A mode whose dynamic stiffness fell below this share of its static one is kept out of the sum
 # and solved for: dividing by it would cost as many digits as the share has zeros.
 _NEAR_POLE = 1e-3
 
+# Modes this far above the excitation, as a ratio of squared frequencies or, at fixed speed, of
+# frequencies, are summed once as a power series; so many terms leave less than round-off.
+_FAR = 16.0
+_TERMS = 13
+
 # Orbit of a unit whirl over (x, z): forward turns with the spin, from z into x.
-_ORBITS = np.array([[-1j, 1.0], [1j, 1.0]]) / np.sqrt(2.0)
+ORBITS = np.array([[-1j, 1.0], [1j, 1.0]]) / np.sqrt(2.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,15 +28,18 @@ class WhirlModes:
 
     With omega = order * speed the rotor's matrices depend on omega^2 alone: in forward whirl
     K0 - omega^2 (M - J / order), in backward whirl K0 - omega^2 (M + J / order), where J is
-    the polar inertia. Two real symmetric eigenproblems therefore serve every speed.
+    the polar inertia. Two real symmetric eigenproblems therefore serve every speed. At fixed
+    speed they are K0 - omega^2 M +- omega speed J, and one problem of twice the size serves
+    every omega.
 
     Attributes
     ----------
-    inverse_square : (2, m) float array
-        1 / omega_k^2 of forward and backward modes [s^2]; negative where gyroscopic stiffening
-        leaves no resonance.
+    inverse : (2, m) float array
+        1 / omega_k^power of forward and backward modes; negative where it is no resonance.
     shapes : (2, p, m) float array
-        Their shapes at the ports, normalised to unit strain energy (phi^T K0 phi = 1).
+        Their shapes at the ports, normalised to unit energy.
+    power : int
+        2 where speed follows omega, 1 at fixed speed.
 
     References
     ----------
@@ -39,15 +47,16 @@ class WhirlModes:
 
     """
 
-    inverse_square: FloatArray
+    inverse: FloatArray
     shapes: FloatArray
+    power: int
 
     @classmethod
     def of(
         cls, rotor: Rotor, ports: list[int], *, springs: FloatArray, order: float,
     ) -> 'WhirlModes':
         """
-        Solve for the modes.
+        Solve for the modes at omega = order * speed.
 
         Parameters
         ----------
@@ -61,16 +70,23 @@ class WhirlModes:
             Excitation frequency over speed.
 
         """
-        stiffness, mass, polar = rotor.plane_matrices
-        stiffness = stiffness.copy()
-        for bearing, spring in zip(rotor.bearings, springs, strict=True):
-            row = 2 * rotor.node_of(bearing.position)
-            stiffness[row, row] += spring
-        pairs = []
-        for direction in (-1.0, 1.0):
-            pairs.append(scipy.linalg.eigh(mass + direction / order * polar, stiffness))
+        stiffness, mass, polar = held(rotor, springs)
+        pairs = [scipy.linalg.eigh(mass + direction / order * polar, stiffness)
+                 for direction in (-1.0, 1.0)]
         return cls(np.array([values for values, _ in pairs]),
-                   np.array([shapes[ports] for _, shapes in pairs]))
+                   np.array([shapes[ports] for _, shapes in pairs]), 2)
+
+    @classmethod
+    def at(
+        cls, rotor: Rotor, ports: list[int], *, springs: FloatArray, speed: float,
+    ) -> 'WhirlModes':
+        """Solve for the modes at fixed speed [rad/s]; parameters as in `of`."""
+        stiffness, mass, polar = held(rotor, springs)
+        squares, rest = scipy.linalg.eigh(mass, stiffness)
+        inverse, vectors = np.linalg.eigh(
+            spinning(np.maximum(squares, 0.0), rest.T @ polar @ rest, np.array([speed])))
+        shapes = rest[ports] @ vectors[0, :len(rest)]
+        return cls(np.array([inverse[0], -inverse[0]]), np.array([shapes, shapes]), 1)
 
     def receptance(self, omega: FloatArray) -> 'PortReceptance':
         """
@@ -82,30 +98,39 @@ class WhirlModes:
             Excitation frequency [rad/s].
 
         """
-        count = self.shapes.shape[1]
-        stiffness = 1.0 - omega[:, None] ** 2 * self.inverse_square.reshape(1, -1)
+        argument = omega**self.power
+        scale = np.abs(argument).max(initial=np.finfo(float).tiny)
+        close = np.abs(self.inverse) * scale * _FAR > 1.0
+        directions, indices = np.nonzero(close)
+        stiffness = 1.0 - argument[:, None] * self.inverse[close]
         size = np.abs(stiffness)
         near = int((size < _NEAR_POLE).sum(axis=1).max(initial=0))
-        nearest = np.argpartition(size, near, axis=1)[:, :near]
-        small = np.take_along_axis(stiffness, nearest, axis=1)
+        nearest = np.argsort(size, axis=1)[:, :near]
         gain = 1.0 / np.where(size < np.finfo(float).tiny, 1.0, stiffness)
         np.put_along_axis(gain, nearest, 0.0, axis=1)
-
-        residues = np.einsum('dpm,dqm->dmpq', self.shapes, self.shapes)
+        shapes = self.shapes[directions, :, indices]
+        powers = (argument / scale)[:, None] ** np.arange(_TERMS)
         forward, backward = (
-            (part @ residue.reshape(-1, count * count)).reshape(-1, count, count)
-            for part, residue in zip(np.split(gain, 2, axis=1), residues, strict=True))
-        between = np.empty((len(omega), count, 2, count, 2), dtype=complex)
-        between[:, :, 0, :, 0] = between[:, :, 1, :, 1] = 0.5 * (forward + backward)
-        between[:, :, 0, :, 1] = -0.5j * (forward - backward)
-        between[:, :, 1, :, 0] = 0.5j * (forward - backward)
+            powers @ self._series(direction, ~close[direction], scale)
+            + gain[:, directions == direction] @ _squares(shapes[directions == direction])
+            for direction in (0, 1))
 
-        shapes = np.concatenate([self.shapes[0], self.shapes[1]], axis=1).T
-        orbits = np.repeat(_ORBITS, self.shapes.shape[2], axis=0)
-        modes = np.einsum('nkp,nka->npak', shapes[nearest], orbits[nearest])
-        return PortReceptance(
-            between.reshape(len(omega), 2 * count, 2 * count),
-            modes.reshape(len(omega), 2 * count, near), small)
+        length, ports = len(omega), self.shapes.shape[1]
+        between = np.empty((length, ports, 2, ports, 2), dtype=complex)
+        one, other = (part.reshape(length, ports, ports)
+                      for part in (0.5 * (forward + backward), 0.5 * (forward - backward)))
+        between[:, :, 0, :, 0] = between[:, :, 1, :, 1] = one
+        between[:, :, 0, :, 1], between[:, :, 1, :, 0] = -1j * other, 1j * other
+        whirls = (shapes[:, :, None] * ORBITS[directions, None]).reshape(-1, 2 * ports)
+        return PortReceptance(between.reshape(length, 2 * ports, 2 * ports),
+                              whirls[nearest].transpose(0, 2, 1),
+                              np.take_along_axis(stiffness, nearest, axis=1))
+
+    def _series(self, direction: int, far: BoolArray, scale: float) -> FloatArray:
+        """Return the receptance of far modes as a power series, (terms, p^2)."""
+        ratio = scale * self.inverse[direction, far]
+        return np.asarray(
+            ratio ** np.arange(_TERMS)[:, None] @ _squares(self.shapes[direction][:, far].T))
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,3 +155,46 @@ class PortReceptance:
     regular: ComplexArray
     shapes: ComplexArray
     stiffness: FloatArray
+
+
+def _squares(shapes: FloatArray) -> FloatArray:
+    """Return the products of a shape's values at two ports, (m, p) to (m, p^2)."""
+    return (shapes[:, :, None] * shapes[:, None]).reshape(-1, shapes.shape[1] ** 2)
+
+
+def held(rotor: Rotor, springs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return stiffness, mass and polar inertia in one plane, springs in place of bearings."""
+    stiffness, mass, polar = rotor.plane_matrices
+    stiffness = stiffness.copy()
+    for bearing, spring in zip(rotor.bearings, springs, strict=True):
+        row = 2 * rotor.node_of(bearing.position)
+        stiffness[row, row] += spring
+    return stiffness, mass, polar
+
+
+def spinning(mass: FloatArray, polar: FloatArray, speed: FloatArray) -> FloatArray:
+    """
+    Return the symmetric matrix whose eigenvalues are 1 / omega of forward whirl.
+
+    Parameters
+    ----------
+    mass : (r,) float array
+        Diagonal of the mass matrix in coordinates of unit stiffness [s^2].
+    polar : (r, r) float array
+        Polar inertia in them [s^2].
+    speed : (n,) float array
+        Fixed rotor speeds [rad/s].
+
+    Returns
+    -------
+    (n, 2 r, 2 r) float array
+        With b = omega sqrt(m) a the problem (1 + omega speed J - omega^2 m) a = 0 is symmetric
+        and linear in 1 / omega, whatever has no mass.
+
+    """
+    count = len(mass)
+    matrix = np.zeros((len(speed), 2 * count, 2 * count))
+    matrix[:, :count, :count] = -speed[:, None, None] * polar
+    matrix[:, range(count), range(count, 2 * count)] = np.sqrt(mass)
+    matrix[:, range(count, 2 * count), range(count)] = np.sqrt(mass)
+    return matrix

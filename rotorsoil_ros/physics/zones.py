@@ -1,4 +1,4 @@
-"""Is a vibration good, acceptable or dangerous by the usual limits?"""
+"""Whether a vibration is good, acceptable or dangerous by the usual limits."""
 
 from dataclasses import dataclass
 import math

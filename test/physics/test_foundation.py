@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.physics.errors import RotorSoilError
-from rotorsoil_ros.physics.foundation import Foundation, add_mass
+from rotorsoil_ros.physics.foundation import add_mass, Foundation
 from rotorsoil_ros.physics.soil import Rectangle, RigidSoil
+
 from machines import CONE, CONTACT
 
 BLOCK = Foundation('block', CONTACT, 0.2, 400.0, 0.3, (30.0, 40.0, 50.0))

@@ -10,6 +10,7 @@ from rotorsoil_ros.physics.foundation import Foundation
 from rotorsoil_ros.physics.identify import identify, identify_unbalance
 from rotorsoil_ros.physics.rotor import Disc, Material, Rotor, ShaftSection
 from rotorsoil_ros.physics.soil import Rectangle, Soil
+
 from machines import bearing
 
 STEEL = Material(2.1e11, 0.3, 7850.0)

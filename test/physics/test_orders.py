@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.physics.errors import NotSolvedError, OutOfTableError, RotorSoilError
-from rotorsoil_ros.physics.orders import SpeedTrack, demodulate, order_vectors
+from rotorsoil_ros.physics.orders import demodulate, order_vectors, SpeedTrack
 
 X1, X2 = 40e-6 * np.exp(0.7j), 6e-6 * np.exp(-2.0j)
 RATE_HZ = 2000.0
@@ -99,7 +99,7 @@ def test_without_a_mark_on_the_shaft_there_is_no_phase():
 
 def test_too_short_a_stretch_is_refused():
     time = np.arange(0.0, 0.06, 1.0 / RATE_HZ)  # 1.5 turns
-    with pytest.raises(NotSolvedError, match='2 turns and 26 samples or more, got 1.5 turns'):
+    with pytest.raises(NotSolvedError, match=r'2 turns and 26 samples or more, got 1\.5 turns'):
         demodulate(time, signal(time, 157.0, 0.0), ramp(157.0, 0.0, 1.0))
 
 

@@ -7,7 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rotorsoil_ros.physics.quasistatic import (
-    Resonance, is_quasi_static, passage_number, speed_rate,
+    is_quasi_static,
+    passage_number,
+    Resonance,
+    speed_rate,
 )
 
 

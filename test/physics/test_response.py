@@ -10,7 +10,8 @@ from rotorsoil_ros.physics.errors import OutOfTableError, RotorSoilError
 from rotorsoil_ros.physics.response import ResponseTable
 from rotorsoil_ros.physics.rotor import Disc
 from rotorsoil_ros.physics.soil import RigidSoil
-from machines import STEEL, bearing, paper_machine, uniform_rotor
+
+from machines import bearing, paper_machine, STEEL, uniform_rotor
 from test_coupled import two_blocks
 
 RANGE = (2.0 * math.pi, 300.0 * math.pi)
@@ -54,7 +55,7 @@ def test_table_is_right_at_unseen_speeds(model):
 
 def resonances(model, count):
     """Return the rotor's own forward poles [rad/s], which on rigid ground are criticals."""
-    forward = model._synchronous_modes.inverse_square[0]
+    forward = model._synchronous_modes.inverse[0]
     return np.sort(forward)[::-1][:count] ** -0.5
 
 
@@ -86,7 +87,7 @@ def test_weakly_excited_backward_resonance_is_not_missed():
         discs=[Disc('d', 0.4, 8.0, 0.02, 0.04)],
         bearings=[bearing(name, place, stiffness=np.diag([1e7, 1.0001e7]), damping=20.0,
                           foundation=None) for name, place in (('a', 0.0), ('b', 1.0))]))
-    backward = np.sort(model._synchronous_modes.inverse_square[1])[-1] ** -0.5
+    backward = np.sort(model._synchronous_modes.inverse[1])[-1] ** -0.5
     table = ResponseTable.build(model, (10.0, 2.0 * backward))
     offsets = np.concatenate([-np.logspace(-2, -8, 300), np.logspace(-8, -2, 300)])
     assert deviation(table, model, backward * (1.0 + offsets), np.array([1e-4])) < PROMISED

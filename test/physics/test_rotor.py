@@ -12,9 +12,15 @@ from rotorsoil_ros.physics.beam import shear_coefficient
 from rotorsoil_ros.physics.dense import rotor_matrices
 from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.rotor import (
-    Bearing, Disc, Material, Probe, Rotor, ShaftSection,
+    Bearing,
+    Disc,
+    Material,
+    Probe,
+    Rotor,
+    ShaftSection,
 )
-from machines import SHARED, STEEL, bearing, paper_rotor, uniform_rotor
+
+from machines import bearing, paper_rotor, SHARED, STEEL, uniform_rotor
 
 CASES = SHARED / 'reference' / 'rotor' / 'benchmarks.json'
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.physics.errors import RotorSoilError
-from rotorsoil_ros.physics.soil import Circle, Rectangle, RigidSoil, Soil, equivalent_radii
+from rotorsoil_ros.physics.soil import Circle, equivalent_radii, Rectangle, RigidSoil, Soil
 
 
 def test_wave_speeds_of_the_paper_are_those_of_three_dimensions():

@@ -6,7 +6,11 @@ import pytest
 
 from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.zones import (
-    ISO_10816_3, ZoneLimits, held_zone, support_class, zone,
+    held_zone,
+    ISO_10816_3,
+    support_class,
+    zone,
+    ZoneLimits,
 )
 
 RIGID = ISO_10816_3[1].of('rigid')

@@ -1,0 +1,265 @@
+"""At which frequencies does the machine vibrate on its own, and which speeds are critical?"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from scipy.optimize import brentq, linear_sum_assignment
+
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.errors import RotorSoilError
+from rotorsoil_ros.physics.spectrum import Spectrum, SpectrumSolver
+
+# Speeds at which the search for criticals begins.
+_FIRST_SPEEDS = 41
+
+_MOST_SPEEDS = 400
+
+# Modes that cross omega = Omega in the range lie below this many times its end.
+_ABOVE = 1.1
+_ALL = 10**6
+
+# A critical speed is found to this share of itself.
+_FOUND = 1e-12
+
+
+@dataclass(frozen=True)
+class Campbell:
+    """
+    Free vibration over rotor speed, modes sorted by frequency.
+
+    Attributes
+    ----------
+    speed : (n,) float array
+        Rotor speed [rad/s].
+    eigenvalue : (n, m) complex array
+        lambda of exp(lambda t) [rad/s]; NaN where a speed has fewer modes.
+    whirl : (n, m) int array
+        +1 forward, -1 backward, 0 where there is no mode.
+    branch : (n, m) int array
+        Which curve a mode belongs to, followed across speed by its shape; -1 where there is no
+        mode.
+
+    """
+
+    speed: FloatArray
+    eigenvalue: ComplexArray
+    whirl: IntArray
+    branch: IntArray
+
+    @property
+    def omega(self) -> FloatArray:
+        """Damped frequency |Im lambda|, (n, m) [rad/s]."""
+        return np.abs(self.eigenvalue.imag)
+
+    @property
+    def damping_ratio(self) -> FloatArray:
+        """-Re lambda / |lambda|, (n, m) [-]; negative is unstable."""
+        return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
+
+
+def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
+    """
+    Return the lowest modes at each speed.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    speeds : (n,) float array
+        Rotor speeds, rising for the branches to make sense [rad/s].
+    count : int
+        Modes wanted at each speed. Fewer are returned where the machine has no more, or where
+        the table of a soil ends below them.
+
+    Notes
+    -----
+    Every mode obeys the compliance of the soil at its own frequency, continued from real
+    frequencies to its decaying vibration, S(lambda / i). What is overdamped has no frequency
+    and is left out.
+
+    References
+    ----------
+    Design note `soil_and_foundation`, sec. 3; API 684 for the use of the diagram.
+
+    """
+    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
+    if not (len(speeds) and np.all(np.isfinite(speeds)) and np.all(speeds >= 0.0)):
+        raise RotorSoilError(f'speeds must be >= 0 rad/s and finite, got {speeds}')
+    if not count >= 1:
+        raise RotorSoilError(f'count must be at least 1 mode, got {count}')
+    found = SpectrumSolver.lowest(model, speeds, count)
+    return Campbell(speeds, 1j * found.frequency, found.whirl, _follow(found))
+
+
+@dataclass(frozen=True)
+class CriticalSpeed:
+    """
+    Speed that excites a mode with its own frequency.
+
+    Attributes
+    ----------
+    speed : float
+        omega = Omega [rad/s].
+    whirl : int
+        +1 forward, which unbalance excites; -1 backward.
+    damping_ratio : float
+        Of the mode [-].
+    deflection : (k, 2) complex array
+        Its shape over (x, z) of the rotor's nodes, the largest amplitude being one.
+    support : (s,) complex array
+        Motion of the support in the same shape, over (x, y, z, rx, ry, rz) of each block, then
+        the deflections of pedestals.
+
+    """
+
+    speed: float
+    whirl: int
+    damping_ratio: float
+    deflection: ComplexArray
+    support: ComplexArray
+
+    @property
+    def amplification_factor(self) -> float:
+        """Return 1 / (2 zeta) [-]; infinite without damping, or with less."""
+        return 0.5 / self.damping_ratio if self.damping_ratio > 0.0 else math.inf
+
+    def separation_margin(self, running: float) -> float:
+        """Return the distance from a running speed [rad/s], as a share of that speed."""
+        return abs(self.speed - running) / running
+
+    def required_margin(self, running: float) -> float:
+        """
+        Return the separation margin that a running speed [rad/s] needs.
+
+        References
+        ----------
+        API 617, 7th ed. (2002), part 1, sec. 2.6.2.10: none below an amplification factor of
+        2.5; 17 (1 - 1 / (AF - 1.5)) percent, and 10 percent more for a critical speed above.
+
+        """
+        factor = self.amplification_factor
+        if factor < 2.5:
+            return 0.0
+        return 0.17 * (1.0 - 1.0 / (factor - 1.5)) + (0.10 if self.speed > running else 0.0)
+
+
+def critical_speeds(
+    model: CoupledModel, speed_range: tuple[float, float],
+) -> tuple[CriticalSpeed, ...]:
+    """
+    Find the speeds at which a mode's damped frequency is the speed itself.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    speed_range : tuple of two floats
+        Lowest and highest speed [rad/s].
+
+    Returns
+    -------
+    tuple of CriticalSpeed
+        Rising; roots of omega(Omega) - Omega on every followed mode, not points of a grid.
+
+    """
+    low, high = speed_range
+    if not 0.0 <= low < high < math.inf:
+        raise RotorSoilError(f'speed range must be 0 <= low < high in rad/s, got {low:g} to '
+                             f'{high:g}')
+    solver = SpectrumSolver.up_to(model, _ABOVE * high)
+    speed = np.linspace(low, high, _FIRST_SPEEDS)
+    while True:
+        found = solver.solve(speed, _ALL)
+        branch = _follow(found)
+        closer = np.setdiff1d(_touching(speed, found, branch), speed)
+        if not len(closer) or len(speed) > _MOST_SPEEDS:
+            break
+        speed = np.union1d(speed, closer)
+    criticals = [_critical(solver, low, high, shapes)
+                 for low, high, shapes in _crossings(speed, found, branch)]
+    return tuple(sorted(criticals, key=lambda critical: critical.speed))
+
+
+def _follow(found: Spectrum) -> IntArray:
+    """Number the curves: a mode continues the one whose shape and frequency are closest."""
+    exists = np.isfinite(found.frequency)
+    shape = _unit(found.shape)
+    branch = np.full(exists.shape, -1)
+    branch[0, exists[0]] = np.arange(exists[0].sum())
+    free = int(exists[0].sum())
+    for index in range(1, len(branch)):
+        old, new = np.flatnonzero(exists[index - 1]), np.flatnonzero(exists[index])
+        likeness = np.abs(shape[index - 1, old].conj() @ shape[index, new].T)
+        before, after = found.frequency[index - 1, old, None], found.frequency[index, new]
+        gap = np.abs(after - before) / np.abs(after + before)
+        ends, starts = linear_sum_assignment(gap - likeness)
+        alike = (likeness - gap)[ends, starts] > 0.3
+        branch[index, new[starts[alike]]] = branch[index - 1, old[ends[alike]]]
+        fresh = new[branch[index, new] < 0]
+        branch[index, fresh] = free + np.arange(len(fresh))
+        free += len(fresh)
+    return branch
+
+
+def _touching(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
+    """Return speeds where a curve that seems to miss omega = Omega may still touch it."""
+    closer = []
+    for name in range(branch.max() + 1):
+        row, mode = np.nonzero(branch == name)
+        place, excess = speed[row], found.frequency[row, mode].real - speed[row]
+        for i in range(1, len(row) - 1):
+            near, before, after = excess[i], excess[i - 1], excess[i + 1]
+            if min(before / near, after / near, 2.0) <= 1.0:
+                continue
+            square, slope, _ = np.polyfit(place[i - 1:i + 2] - place[i], excess[i - 1:i + 2], 2)
+            if slope**2 > 4.0 * square * near:
+                closer.append(place[i] - 0.5 * slope / square)
+    return np.array(closer)
+
+
+def _crossings(
+    speed: FloatArray, found: Spectrum, branch: IntArray,
+) -> Iterator[tuple[float, float, ComplexArray]]:
+    """Yield two speeds between which a curve crosses omega = Omega, and its shapes there."""
+    for name in range(branch.max() + 1):
+        row, mode = np.nonzero(branch == name)
+        above = found.frequency[row, mode].real > speed[row]
+        for i in np.flatnonzero(above[:-1] != above[1:]):
+            pair = slice(i, i + 2)
+            low, high = speed[row[pair]]
+            yield float(low), float(high), found.shape[row[pair], mode[pair]]
+
+
+def _critical(
+    solver: SpectrumSolver, low: float, high: float, shapes: ComplexArray,
+) -> CriticalSpeed:
+    """Close in on the crossing of the curve that has these shapes at both ends, (2, d)."""
+    wanted = _unit(shapes).conj().T
+
+    def likeness(found: Spectrum) -> FloatArray:
+        return np.asarray(np.nan_to_num(np.abs(_unit(found.shape[0]) @ wanted)).sum(axis=1))
+
+    def mode_at(speed: float) -> tuple[Spectrum, int]:
+        found = solver.solve(np.array([speed]), _ALL)
+        return found, int(likeness(found).argmax())
+
+    def excess(speed: float) -> float:
+        found, mode = mode_at(speed)
+        return float(found.frequency[0, mode].real - speed)
+
+    speed = brentq(excess, low, high, xtol=_FOUND * high, rtol=_FOUND)
+    found, mode = mode_at(speed)
+    frequency = found.frequency[0, mode]
+    deflection = solver.deflection(found.rotor[0, mode])
+    largest = np.abs(deflection).max()
+    return CriticalSpeed(speed, int(found.whirl[0, mode]),
+                         float(frequency.imag / np.abs(frequency)),
+                         deflection / largest, found.support[0, mode] / largest)
+
+
+def _unit(shape: ComplexArray) -> ComplexArray:
+    length = np.linalg.norm(shape, axis=-1, keepdims=True)
+    return np.asarray(shape / np.where(length > 0.0, length, 1.0))

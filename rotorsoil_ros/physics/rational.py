@@ -1,0 +1,224 @@
+"""How a compliance that is known at real frequencies continues to decaying vibration."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse.csgraph import connected_components
+
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
+
+# A fit ends when every sample is met this well, relative to the diagonal of its matrix ...
+_TOLERANCE = 1e-12
+_MOST_NODES = 40
+
+# ... or when so many more nodes make a fair fit less than ten times better: what is left is the
+# rounding of a printed table, and following it would put poles where there are none.
+_MORE_NODES = 4
+_FAIR = 1e-2
+_ROUGH = 1e-4
+
+# Fits worse than this are corrected by what they miss at the real frequency of a vibration.
+_EXACT = 1e-9
+
+# Entries that stay below this share of their diagonal are round-off.
+_UNCOUPLED = 1e-10
+
+# Stands for the distance to a node that is hit: small, yet its inverse is finite.
+_ON_NODE = 1e-150
+
+# Poles this many times higher than all samples are constants.
+_FAR = 1e6
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """
+    Matrix function of frequency, continued part by part.
+
+    Attributes
+    ----------
+    parts : tuple of (indices, RationalMatrix)
+        What does not couple is fitted by itself, so that no part has poles of another.
+    size : (d,) float array
+        Typical square root of the diagonal, which makes the entries comparable.
+    known : callable or None
+        The function at real frequencies (n,), where the fit is too rough; else None.
+    span : tuple of two floats
+        Where it is known [rad/s].
+
+    """
+
+    parts: tuple[tuple[IntArray, 'RationalMatrix'], ...]
+    size: FloatArray
+    known: Callable[[FloatArray], ComplexArray] | None
+    span: tuple[float, float]
+
+    @classmethod
+    def of(
+        cls, omega: FloatArray, known: Callable[[FloatArray], ComplexArray],
+    ) -> 'Continuation':
+        """
+        Fit a function.
+
+        Parameters
+        ----------
+        omega : (n,) float array
+            Frequencies at which it is sampled, ascending [rad/s].
+        known : callable
+            From real frequencies (n,) to matrices (n, d, d).
+
+        """
+        values = known(omega)
+        size = np.sqrt(np.abs(values.diagonal(axis1=1, axis2=2)).max(axis=0, initial=0.0))
+        size[size == 0.0] = 1.0
+        values = values / (size[:, None] * size)
+        couples = np.abs(values).max(axis=0, initial=0.0) > _UNCOUPLED
+        _, labels = connected_components(couples, directed=False)
+        parts = []
+        for label in np.unique(labels):
+            index = np.flatnonzero(labels == label)
+            parts.append((index, RationalMatrix.of(omega, values[:, index[:, None], index])))
+        fit = cls(tuple(parts), size, None, (float(omega[0]), float(omega[-1])))
+        rough = np.abs(fit(omega.astype(complex)) - values).max(initial=0.0) > _EXACT
+        return replace(fit, known=known) if rough else fit
+
+    def __call__(self, omega: ComplexArray) -> ComplexArray:
+        """Return the function over its size at complex frequencies, (..., d, d)."""
+        values = self._fitted(omega)
+        if self.known is not None:
+            real = np.clip(omega.real, *self.span)
+            exact = self.known(real.ravel()) / (self.size[:, None] * self.size)
+            values += exact.reshape(values.shape) - self._fitted(real.astype(complex))
+        return values
+
+    def _fitted(self, omega: ComplexArray) -> ComplexArray:
+        count = len(self.size)
+        values = np.zeros((*omega.shape, count, count), dtype=complex)
+        for index, part in self.parts:
+            values[..., index[:, None], index] = part(omega)
+        return values
+
+    def states(self, tolerance: float) -> tuple[ComplexArray, ComplexArray, ComplexArray,
+                                                ComplexArray]:
+        """
+        Return the function over its size as constant + left (omega - poles)^-1 right.
+
+        Parameters
+        ----------
+        tolerance : float
+            Relative size below which a term is left out.
+
+        Returns
+        -------
+        constant (d, d), poles (s,), left (d, s), right (s, d) : complex arrays
+
+        """
+        count = len(self.size)
+        constant = np.zeros((count, count), dtype=complex)
+        terms = []
+        for index, part in self.parts:
+            steady, poles, left, right = part.states(tolerance)
+            constant[index[:, None], index] = steady
+            place = np.eye(count)[:, index]
+            terms.append((poles, place @ left, right @ place.T))
+        if not terms:
+            return constant, *(np.zeros(shape, dtype=complex)
+                               for shape in (0, (count, 0), (0, count)))
+        poles, left, right = zip(*terms, strict=True)
+        return constant, np.concatenate(poles), np.hstack(left), np.vstack(right)
+
+
+@dataclass(frozen=True)
+class RationalMatrix:
+    """
+    Matrix function in barycentric form, the same denominator under every entry.
+
+    Attributes
+    ----------
+    nodes : (m,) float array
+        Frequencies at which it is exact [rad/s].
+    values : (m, d, d) complex array
+        Function at the nodes.
+    weights : (m,) complex array
+        Of the barycentric form.
+
+    References
+    ----------
+    Nakatsukasa, Sete & Trefethen (2018), The AAA algorithm for rational approximation, SIAM
+    J. Sci. Comput. 40; Lietaert et al. (2022), Automatic rational approximation and
+    linearization of nonlinear eigenvalue problems, IMA J. Numer. Anal. 42, for functions with
+    a common denominator.
+
+    """
+
+    nodes: FloatArray
+    values: ComplexArray
+    weights: ComplexArray
+
+    @classmethod
+    def of(cls, omega: FloatArray, values: ComplexArray) -> 'RationalMatrix':
+        """Fit samples (n, d, d) at ascending frequencies (n,)."""
+        entries = values.reshape(len(omega), -1)
+        error = np.abs(entries - entries.mean(axis=0)).max(axis=1)
+        chosen: list[int] = []
+        fits: list[tuple[float, ComplexArray]] = []
+        most = min(_MOST_NODES, len(omega) // 2)
+        while len(fits) < most and not _is_enough([worst for worst, _ in fits]):
+            chosen.append(int(error.argmax()))
+            rest = np.delete(np.arange(len(omega)), chosen)
+            cauchy = 1.0 / (omega[rest, None] - omega[chosen])
+            loewner = (entries[rest, None, :] - entries[chosen]) * cauchy[..., None]
+            weights = _smallest(loewner.transpose(0, 2, 1).reshape(-1, len(chosen)))
+            error = np.zeros(len(omega))
+            error[rest] = np.abs(
+                (cauchy * weights) @ entries[chosen] / (cauchy @ weights)[:, None]
+                - entries[rest]).max(axis=1)
+            fits.append((float(error.max()), weights))
+        least = min(worst for worst, _ in fits)
+        enough = _TOLERANCE if least <= _TOLERANCE else max(_ROUGH, 10.0 * least)
+        count = next(i for i, (worst, _) in enumerate(fits, 1) if worst <= enough)
+        return cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
+
+    def __call__(self, omega: ComplexArray) -> ComplexArray:
+        """Return the function at real or complex frequencies, (..., d, d)."""
+        gap = omega[..., None] - self.nodes
+        cauchy = self.weights / np.where(gap == 0.0, _ON_NODE, gap)
+        values = cauchy @ self.values.reshape(len(self.nodes), -1)
+        values /= cauchy.sum(axis=-1)[..., None]
+        return np.asarray(values.reshape(*omega.shape, *self.values.shape[1:]))
+
+    def states(self, tolerance: float) -> tuple[ComplexArray, ComplexArray, ComplexArray,
+                                                ComplexArray]:
+        """Return the function as constant + left (omega - poles)^-1 right."""
+        count, size, _ = self.values.shape
+        arrow = np.zeros((count + 1, count + 1), dtype=complex)
+        arrow[0, 1:], arrow[1:, 0] = self.weights, 1.0
+        arrow[1:, 1:] = np.diag(self.nodes)
+        poles = scipy.linalg.eigvals(arrow, np.diag([0.0] + [1.0] * count))
+        poles = poles[np.isfinite(poles) & (np.abs(poles) < _FAR * self.nodes.max())]
+        cauchy = 1.0 / (poles[:, None] - self.nodes)
+        flat = self.values.reshape(count, -1)
+        residues = (cauchy * self.weights) @ flat / -(cauchy**2 @ self.weights)[:, None]
+        left, terms, right = np.linalg.svd(residues.reshape(-1, size, size))
+        reach = np.abs(poles[:, None] - self.nodes).min(axis=1, initial=np.inf)
+        pole, term = np.nonzero(terms > tolerance * reach[:, None])
+        constant = (self.weights @ flat / self.weights.sum()).reshape(size, size)
+        return (constant, poles[pole], left[pole, :, term].T * terms[pole, term],
+                right[pole, term])
+
+
+def _is_enough(errors: list[float]) -> bool:
+    """Return whether a fit that had these errors with 1, 2, 3 ... nodes should end."""
+    if not errors:
+        return False
+    stuck = len(errors) > _MORE_NODES and errors[-1] > 0.1 * errors[-1 - _MORE_NODES]
+    return errors[-1] <= _TOLERANCE or (stuck and errors[-1] < _FAIR)
+
+
+def _smallest(matrix: ComplexArray) -> ComplexArray:
+    """Return the right singular vector of the smallest singular value."""
+    reduced = np.linalg.qr(matrix, mode='r')
+    _, _, right = np.linalg.svd(reduced)
+    return np.asarray(right[-1].conj())

@@ -1,0 +1,235 @@
+"""How does the machine vibrate on its own, at any speed?"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.errors import NotSolvedError, OutOfTableError
+from rotorsoil_ros.physics.free import FreeVibration
+from rotorsoil_ros.physics.rational import Continuation
+from rotorsoil_ros.physics.reduced import ReducedRotor
+from rotorsoil_ros.physics.support import Support
+from rotorsoil_ros.physics.units import rad_s_to_rpm
+from rotorsoil_ros.physics.whirl import ORBITS
+
+# A shaft at rest whirls in no direction; one that creeps, relative to its lowest mode, does.
+_CREEP = 1e-9
+
+# Speeds that are solved together: bounds memory.
+_CHUNK = 64
+
+# Modes at rest beyond those wanted that span the rotor's shapes.
+_MORE_SHAPES = 6
+
+# Rotor modes that are solved for exactly, up to so many times the highest frequency: more of them
+# only where fewer leave the guesses too rough.
+_REACHES = (1.5, 5.0, 1e6)
+
+# Samples from which the compliance is continued.
+_SAMPLES = 120
+
+# The search ends at this many times the rotor's own frequencies.
+_HIGHEST = 30.0
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """
+    Lowest free vibrations at some speeds, NaN where a speed has fewer.
+
+    Attributes
+    ----------
+    frequency : (n, p) complex array
+        w = lambda / i [rad/s]: damped frequency + i decay, ascending in frequency.
+    whirl : (n, p) int array
+        +1 where the rotor's kinetic energy is that of a forward orbit, else -1.
+    shape : (n, p, d) complex array
+        Coordinates in which the kinetic energy is the sum of squares; the same at all speeds.
+    rotor : (n, p, 2, r) complex array
+        Shape of the rotor, forward and backward, in its reduced coordinates.
+    support : (n, p, s) complex array
+        Motion of the support, over the columns of `Support.motion_rows`.
+
+    """
+
+    frequency: ComplexArray
+    whirl: IntArray
+    shape: ComplexArray
+    rotor: ComplexArray
+    support: ComplexArray
+
+
+@dataclass(frozen=True)
+class SpectrumSolver:
+    """
+    What all speeds share.
+
+    Attributes
+    ----------
+    model : CoupledModel
+        The machine.
+    basis : ReducedRotor
+        Its rotor in a subspace.
+    compliance : Continuation
+        Of the support without its mass.
+    span : tuple of two floats
+        Frequencies between which modes are looked for [rad/s].
+
+    """
+
+    model: CoupledModel
+    basis: ReducedRotor
+    compliance: Continuation
+    span: tuple[float, float]
+
+    @classmethod
+    def up_to(cls, model: CoupledModel, highest: float, *, shapes: int = _MORE_SHAPES) -> 'SpectrumSolver':
+        """
+        Prepare for modes up to a frequency, as far as the soil is known.
+
+        Parameters
+        ----------
+        model : CoupledModel
+            The machine.
+        highest : float
+            Frequency [rad/s].
+        shapes : int
+            Least number of modes at rest that span the rotor's shapes.
+
+        """
+        while True:
+            basis = ReducedRotor.of(model.rotor, model.nominal_springs, count=shapes)
+            slow = int((basis.mass * highest**2 > 1.0).sum())
+            if shapes >= slow + _MORE_SHAPES or shapes >= len(basis.shapes):
+                break
+            shapes = slow + _MORE_SHAPES
+        low, high = _known(model.support, highest)
+        omega = np.unique(np.concatenate([
+            np.linspace(low, high, _SAMPLES // 2),
+            np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
+        compliance = Continuation.of(omega, model.support.motion_compliance)
+        return cls(model, basis, compliance, (low, high))
+
+    @classmethod
+    def lowest(
+        cls, model: CoupledModel, speed: FloatArray, count: int,
+    ) -> Spectrum:
+        """
+        Return the lowest modes at each speed.
+
+        Parameters
+        ----------
+        model : CoupledModel
+            The machine.
+        speed : (n,) float array
+            Rotor speeds [rad/s].
+        count : int
+            Modes wanted at each.
+
+        """
+        shapes = count // 2 + _MORE_SHAPES
+        basis = ReducedRotor.of(model.rotor, model.nominal_springs, count=shapes)
+        first = highest = _highest(basis, speed, count)
+        while True:
+            solver = cls.up_to(model, highest, shapes=shapes)
+            found = solver.solve(speed, count)
+            enough = np.isfinite(found.frequency).sum(axis=1).min() >= count
+            if enough or solver.span[1] < highest or highest > _HIGHEST * first:
+                return found
+            highest *= 2.0
+
+    def solve(self, speed: FloatArray, count: int) -> Spectrum:
+        """Return at most `count` modes at each of the speeds (n,) [rad/s]."""
+        parts = [self._solve(speed[start:start + _CHUNK], count)
+                 for start in range(0, len(speed), _CHUNK)]
+        width = max(part.frequency.shape[1] for part in parts)
+        return Spectrum(*(np.concatenate([_widen(getattr(part, field.name), width)
+                                          for part in parts]) for field in fields(Spectrum)))
+
+    def deflection(self, rotor: ComplexArray) -> ComplexArray:
+        """Return (x, z) of every node, (k, 2), in a shape of the rotor, (2, r)."""
+        return np.asarray(self.basis.shapes[::2] @ rotor.T @ ORBITS)
+
+    def _solve(self, speed: FloatArray, count: int) -> Spectrum:
+        basis = self.basis
+        inverse, amplitude = basis.spin(np.maximum(speed, _CREEP * basis.mass.max() ** -0.5))
+        for reach in _REACHES:
+            vibration = self._at(speed, inverse, amplitude, reach)
+            frequency, vector, sound = vibration.solve(count)
+            if sound.all():
+                break
+        else:
+            raise NotSolvedError('modes could not be told apart at '
+                                 f'{rad_s_to_rpm(float(speed[~sound][0])):g} rpm')
+        low, high = self.span
+        frequency[~((frequency.real >= low) & (frequency.real <= high))] = np.nan
+        order = np.argsort(frequency.real, axis=1)[:, :count]
+        frequency = np.take_along_axis(frequency, order, axis=1)
+        vector = np.take_along_axis(vector, order[..., None], axis=1)
+        states = vibration.amplitudes(np.nan_to_num(frequency), vector)
+        half = amplitude.shape[2]
+        turn = amplitude.transpose(0, 2, 1)
+        rotor = np.stack([states[..., :half] @ turn, states[..., half:] @ turn], axis=2)
+        own = vector[..., vector.shape[2] - len(vibration.mass):]
+        energies = basis.mass * np.abs(rotor) ** 2
+        forward = energies[:, :, 0].sum(axis=-1) >= energies[:, :, 1].sum(axis=-1)
+        whirl = np.where(np.isfinite(frequency), np.where(forward, 1, -1), 0)
+        values, vectors = np.linalg.eigh(vibration.mass)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        missing = np.where(np.isfinite(frequency), 0.0, np.nan)[..., None]
+        shape = missing + np.concatenate([(np.sqrt(basis.mass) * rotor).reshape(*frequency.shape, -1),
+                                own @ root], axis=-1)
+        return Spectrum(frequency, whirl, shape, rotor, own * self.compliance.size)
+
+    def _at(
+        self, speed: FloatArray, inverse: FloatArray, amplitude: FloatArray, reach: float,
+    ) -> FreeVibration:
+        model, support, size = self.model, self.model.support, self.compliance.size
+        rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
+        unit = np.sqrt(model.nominal_springs)
+        journals = (unit[:, None] * self.basis.shapes[rows]) @ amplitude
+        unit = np.repeat(unit, 2)
+        stiffness, damping = model.bearing_coefficients(speed)
+        return FreeVibration(
+            inverse, journals, stiffness / (unit[:, None] * unit),
+            damping / (unit[:, None] * unit), unit[:, None] * support.motion_rows * size,
+            size[:, None] * support.motion_mass * size, self.compliance, self.span[1], reach)
+
+
+def _highest(basis: ReducedRotor, speed: FloatArray, count: int) -> float:
+    """Return a frequency above the first modes of the rotor on its nominal springs."""
+    inverse, _ = basis.spin(np.array([speed.min(), speed.max()]))
+    both = np.sort(np.concatenate([inverse, -inverse], axis=1), axis=1)
+    wanted = min(count, both.shape[1] // 2)
+    return float((1.1 / np.maximum(both[:, -wanted], 1e-9 * both[:, -1])).max())
+
+
+def _known(support: Support, highest: float) -> tuple[float, float]:
+    """Return the part of 0 to `highest` for which every soil gives an answer."""
+    def answers(omega: float) -> bool:
+        try:
+            return bool(np.all(np.isfinite(support.motion_compliance(np.array([omega])))))
+        except OutOfTableError:
+            return False
+
+    def edge(inside: float, outside: float) -> float:
+        if answers(outside):
+            return outside
+        while abs(outside - inside) > 1e-4 * highest:
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if answers(middle) else (inside, middle)
+        return inside
+
+    within = highest
+    while not answers(within) and within > 1e-6 * highest:
+        within *= 0.5
+    return edge(within, 0.0), edge(within, highest)
+
+
+def _widen(values: np.ndarray, width: int) -> np.ndarray:
+    """Fill up the second axis: with NaN, or with the 0 of no whirl."""
+    missing = [(0, 0)] * values.ndim
+    missing[1] = (0, width - values.shape[1])
+    return np.pad(values, missing, constant_values=np.nan if values.dtype == complex else 0)
