@@ -46,7 +46,7 @@ setup(
         'zstandard>=0.20',
     ],
     extras_require={
-        'viewer': ['rerun-sdk>=0.23'],
+        'viewer': ['rerun-sdk>=0.38'],
         'test': [
             'hypothesis>=6.100',
             'mypy>=1.10',

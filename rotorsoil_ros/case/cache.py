@@ -1,7 +1,7 @@
 """Where tables wait for the next start, and how one knows that they are the right ones."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 import hashlib
 import json
 import logging
@@ -13,9 +13,6 @@ import zipfile
 import zlib
 
 import numpy as np
-
-from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.physics.response import ResponseTable, TOLERANCE
 
 # To be raised whenever the physics gives other numbers for the same case: old tables must go.
 ALGORITHM = 1
@@ -129,48 +126,3 @@ class Cache:
             _LOG.warning('%s cannot be written: %s', path, error)
             if partial is not None:
                 Path(partial).unlink(missing_ok=True)
-
-
-def response_key(case: Case) -> str:
-    """Return what identifies the response table of a case: all of it but its unbalance."""
-    models = case.soil_models()
-    return content_key('response', TOLERANCE, case.rotor, case.foundations, models,
-                       case.speed_range)
-
-
-def stored_response_table(case: Case, cache: Path) -> ResponseTable | None:
-    """Return the response table of a case if the cache holds it."""
-    key = response_key(case)
-    arrays = Cache(cache).load('response', key)
-    return None if arrays is None else ResponseTable.from_arrays(arrays, key=key)
-
-
-def response_table(case: Case, cache: Path) -> ResponseTable:
-    """
-    Return the response table of a case, computed and stored if the cache does not hold it.
-
-    Parameters
-    ----------
-    case : Case
-        The machine.
-    cache : Path
-        Directory of the cache.
-
-    Returns
-    -------
-    ResponseTable
-        With its key.
-
-    Raises
-    ------
-    RotorSoilError
-        If the case cannot be solved.
-
-    """
-    stored = stored_response_table(case, cache)
-    if stored is not None:
-        return stored
-    key = response_key(case)
-    table = replace(ResponseTable.build(case.coupled_model(), case.speed_range), key=key)
-    Cache(cache).store('response', key, table.to_arrays())
-    return table

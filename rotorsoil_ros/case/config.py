@@ -1,6 +1,6 @@
 """Which machine a case file describes."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +12,13 @@ from pydantic import ValidationError
 
 from rotorsoil_ros.case import document, schema
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.physics.cone import ConeModel
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
 from rotorsoil_ros.physics.foundation import Foundation
+from rotorsoil_ros.physics.infinite import a0_range
+from rotorsoil_ros.physics.infinite_table import require_kind
 from rotorsoil_ros.physics.rotor import Bearing, Disc, Material, Probe, Rotor, ShaftSection
-from rotorsoil_ros.physics.soil import Circle, Contact, Rectangle, RigidSoil, Soil, SoilModel
+from rotorsoil_ros.physics.soil import Circle, Contact, Rectangle, RigidSoil, Soil
 from rotorsoil_ros.physics.units import rpm_to_rad_s
 
 _Place: TypeAlias = tuple[int | str, ...]
@@ -58,31 +59,20 @@ class Case:
     unbalance: ComplexArray
     speed_range: tuple[float, float]
 
-    def soil_models(self) -> tuple[SoilModel, ...]:
-        """
-        Return the model of the soil under each foundation.
 
-        Raises
-        ------
-        InputError
-            If the support needs a soil that is not there.
-
-        """
-        if self.support.model == 'rigid':
-            return tuple(RigidSoil() for _ in self.foundations)
-        if self.soil is None:
-            raise InputError(f'{self.path}: soil: is missing; the support model '
-                             f'{self.support.model} needs it')
-        model = _SOIL_MODELS[self.support.model]
-        return tuple(model(self.soil, foundation.contact) for foundation in self.foundations)
-
-    def coupled_model(self) -> CoupledModel:
-        """Return rotor, blocks and soil as one model."""
-        return CoupledModel(self.rotor, self.foundations, self.soil_models())
+# Natural modes above the running speed and excitation at twice the speed need the soil too.
+_HIGHEST_ORDER = 2.0
 
 
-# A support model of a case file, and what builds it for one soil and one contact.
-_SOIL_MODELS: dict[str, Callable[[Soil, Contact], SoilModel]] = {'cone': ConeModel}
+def infinite_range(
+    soil: Soil, contact: Contact, geometry: str, speed_range: tuple[float, float],
+) -> tuple[float, float]:
+    """Return the frequencies [rad/s] that infinite elements have to cover for some speeds."""
+    low, high = speed_range
+    # A disc is known down to rest; a strip has no static stiffness.
+    omega = 0.0 if geometry == 'disc' else low, _HIGHEST_ORDER * high
+    a0_range(soil, contact, geometry, omega_min=omega[0], omega_max=omega[1])
+    return omega
 
 
 def load(path: Path, overrides: Sequence[str] = ()) -> Case:
@@ -99,7 +89,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Case:
     Returns
     -------
     Case
-        The machine, fit for `coupled_model`.
+        The machine, fit for `models.coupled_model`.
 
     Raises
     ------
@@ -143,7 +133,8 @@ class _Builder:
             foundations=self._foundations(rotor), rotor=rotor,
             unbalance=self._unbalance(rotor), speed_range=self._speed_range())
         with self._at('rotor', entry=entries.rotor):
-            case.coupled_model()
+            CoupledModel(rotor, case.foundations, [RigidSoil() for _ in case.foundations])
+        self._refuse_unreachable_soil(case)
         return case
 
     @contextmanager
@@ -192,15 +183,25 @@ class _Builder:
         support = self.entries.support
         if support.model == 'rigid':
             return
-        if support.model not in _SOIL_MODELS:
-            raise self._error('support', 'model', problem=f'{support.model} is not available in '
-                                                          'this version')
+        if self.entries.soil is None:
+            raise self._error('soil', problem=f'is missing; the support model {support.model} '
+                                              'needs it')
         if support.model == 'cone' and support.geometry != 'disc':
             raise self._error('support', 'geometry', problem='must be disc for the model cone, '
                                                              f'got {support.geometry}')
         if not self.entries.foundations:
             raise self._error('foundations', problem='is missing; the support model '
                                                      f'{support.model} needs a block')
+
+    def _refuse_unreachable_soil(self, case: Case) -> None:
+        if case.support.model != 'infinite_elements' or case.soil is None:
+            return
+        geometry = case.support.geometry
+        with self._at('soil', entry=self.entries.soil):
+            require_kind(geometry, case.soil.poisson_ratio, case.soil.loss_factor)
+        for index, foundation in enumerate(case.foundations):
+            with self._at('foundations', index):
+                infinite_range(case.soil, foundation.contact, geometry, case.speed_range)
 
     def _rotor(self) -> Rotor:
         entries = self.entries.rotor
@@ -262,7 +263,7 @@ class _Builder:
                     name=entry.name, contact=self._contact(index, entry), mass=entry.mass,
                     centre_y=0.5 * (min(seats) + max(seats)) if centre_y is None else centre_y,
                     centre_of_gravity_height=entry.centre_of_gravity_height,
-                    inertia=entry.inertia))
+                    inertia=entry.inertia, height=entry.height))
         return tuple(foundations)
 
     def _contact(self, index: int, entry: schema.Foundation) -> Contact:

@@ -92,7 +92,7 @@ def read(path: Path) -> dict[str, Any]:
     if len(content) > _LARGEST_BYTES:
         raise InputError(f'{path}: is larger than {_LARGEST_BYTES // 1024} KiB: no case file')
     try:
-        text = content.decode('utf-8-sig')
+        text = content.decode('utf-8')
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') from error
     document = parse(text, source=str(path))

@@ -12,6 +12,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.drawing import machine_drawing
 from rotorsoil_ros.case.peaks import Peak, resolved_speeds, resonances
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.response import Predictor, ResponseTable
 from rotorsoil_ros.physics.rotor import Probe
 from rotorsoil_ros.physics.soil import DOFS
@@ -29,18 +30,20 @@ _LARGEST_DRAWN_NODES = 120
 _TURN = np.linspace(0.0, 1.86 * np.pi, 181)
 
 
-def all_figures(case: Case, table: ResponseTable) -> Iterator[tuple[str, Figure]]:
+def all_figures(
+    case: Case, model: CoupledModel, table: ResponseTable,
+) -> Iterator[tuple[str, Figure]]:
     """Yield name and figure of every picture of a case."""
     predictor = table.predictor(case.unbalance)
     yield 'machine', machine_drawing(case)
     if case.support.model != 'rigid':
-        yield 'support', support(case)
+        yield 'support', support(case, model)
     for kind, channels in channel_groups(case).items():
         yield f'bode_{kind}', bode(predictor, channels, f'{case.name}: {kind}')
     peaks = main_peaks(case, predictor)
     if peaks:
         yield 'orbits', orbits(case, predictor, peaks)
-        yield 'shapes', shapes(case, peaks)
+        yield 'shapes', shapes(case, model, peaks)
 
 
 def main_peaks(case: Case, predictor: Predictor) -> list[Peak]:
@@ -69,13 +72,13 @@ def channel_groups(case: Case) -> dict[str, list[str]]:
     return {kind: names for kind, names in groups.items() if names}
 
 
-def support(case: Case) -> Figure:
+def support(case: Case, model: CoupledModel) -> Figure:
     """Draw what the soil under every block opposes to one force or moment, over frequency."""
-    omega = np.linspace(0.0, case.speed_range[1], 400)
+    omega = np.linspace(*case.speed_range, 400)
     figure = Figure(figsize=(7.5, 7.5), layout='constrained')
     grid = figure.subplots(3, 2, sharex=True)
-    for block, model in zip(case.foundations, case.soil_models(), strict=True):
-        diagonal = np.diagonal(model.compliance(omega), axis1=1, axis2=2)
+    for block, soil in zip(model.foundations, model.soil_models, strict=True):
+        diagonal = np.diagonal(soil.compliance(omega), axis1=1, axis2=2)
         for dof in np.flatnonzero(np.all(diagonal != 0.0, axis=0)):
             column = grid[:, dof // 3]
             style: dict[str, Any] = {
@@ -163,12 +166,12 @@ def _over_a_turn(amplitude: complex) -> FloatArray:
     return np.asarray(_MICRO * np.real(amplitude * np.exp(1j * _TURN)))
 
 
-def shapes(case: Case, peaks: Sequence[Peak]) -> Figure:
+def shapes(case: Case, model: CoupledModel, peaks: Sequence[Peak]) -> Figure:
     """Draw the deflected shaft at some speeds, solved at the nodes of the mesh."""
     nodes = case.rotor.node_positions
     nodes = nodes[::1 + len(nodes) // _LARGEST_DRAWN_NODES]
     probes = tuple(Probe(f'node_{number}', place) for number, place in enumerate(nodes))
-    everywhere = replace(case, rotor=replace(case.rotor, probes=probes)).coupled_model()
+    everywhere = replace(model, rotor=replace(case.rotor, probes=probes))
     first = everywhere.channels.index('node_0_x')
     speed = np.array([peak.speed for peak in peaks])
     motion = everywhere.unbalance_response(speed, case.unbalance).displacement

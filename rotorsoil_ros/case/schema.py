@@ -113,6 +113,7 @@ class Foundation(Entry):
     mass: Kilogram
     centre_of_gravity_height: Metre
     inertia: tuple[KilogramSquareMetre, KilogramSquareMetre, KilogramSquareMetre]
+    height: Metre | None = None
 
 
 class Material(Entry):

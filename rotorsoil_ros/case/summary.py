@@ -1,6 +1,6 @@
 """What can be said of a case before anything runs: derived quantities, and what looks odd."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -16,8 +16,10 @@ _LARGEST_A0_INCOMPRESSIBLE = 2.0
 _LARGEST_ASPECT = 2.0
 
 
-def derived_quantities(case: Case) -> Iterator[tuple[str, str]]:
-    """Yield names and values, with units, of what follows from a case."""
+def derived_quantities(
+    case: Case, soil_models: Sequence[SoilModel],
+) -> Iterator[tuple[str, str]]:
+    """Yield names and values, with units, of what follows from a case and its soil."""
     low, high = case.speed_range
     yield 'case', f'{case.name} ({case.path})'
     yield 'speed range', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm'
@@ -30,7 +32,7 @@ def derived_quantities(case: Case) -> Iterator[tuple[str, str]]:
     if case.soil is not None:
         yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
         yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
-    for foundation, model in zip(case.foundations, case.soil_models(), strict=True):
+    for foundation, model in zip(case.foundations, soil_models, strict=True):
         yield from _of_foundation(case, foundation, model)
 
 

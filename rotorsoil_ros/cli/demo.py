@@ -10,12 +10,13 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from rotorsoil_ros.case import cache
+from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.plots import all_figures, trend
 from rotorsoil_ros.cli.progress import progress
@@ -23,6 +24,7 @@ from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.events import NANOSECONDS
 from rotorsoil_ros.live.profile import write_speed_profile
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
+from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.response import ResponseTable
 from rotorsoil_ros.physics.units import rad_s_to_rpm, rpm_to_rad_s
@@ -32,7 +34,6 @@ MACHINE = 'paper_rotor'
 # Run up through both pairs of critical speeds, dwell, coast down against a viscous drag.
 _RUN_UP_S, _DWELL_S, _COAST_S, _RATE_HZ = 12.0, 3.0, 9.0, 100
 _SLOWEST_RPM, _FASTEST_RPM = 300.0, 8400.0
-_START_NS = 1_767_225_600 * NANOSECONDS  # 2026-01-01: the same files whenever it runs
 
 _SHUTDOWN_S = 5.0
 _ONE_DOMAIN_OF = 100
@@ -57,26 +58,27 @@ def demo(arguments: Namespace) -> int:
     with as_file(files('rotorsoil_ros') / 'config' / f'{MACHINE}.yaml') as path:
         case = load(path)
         with progress('solving for every speed') as _:
-            table = cache.response_table(case, directory)
+            model = models.coupled_model(case, directory)
+            table = models.response_table(case, model, directory)
         profile = out / 'profile.mcap'
-        write_speed_profile(profile, MACHINE, *speed_profile())
+        write_speed_profile(profile, MACHINE, *speed_profile(time.time_ns()))
         print(f'{MACHINE}: run-up to {_FASTEST_RPM:g} rpm, dwell, coast-down: '
               f'{_RUN_UP_S + _DWELL_S + _COAST_S:g} s', flush=True)
         log = _live(path, profile, out, directory)
     answers = _read(log)
-    _draw(case, table, answers, out / 'plots')
+    _draw(model, table, answers, out / 'plots', case=case)
     _summarise(case, answers, out, log)
     return 0
 
 
-def speed_profile() -> tuple[IntArray, FloatArray]:
-    """Return stamps (n,) [ns] and speeds (n,) [rad/s] of the demonstration."""
-    time_s = np.arange(0.0, _RUN_UP_S + _DWELL_S + _COAST_S, 1.0 / _RATE_HZ)
+def speed_profile(start_ns: int) -> tuple[IntArray, FloatArray]:
+    """Return stamps (n,) [ns] from a start on and speeds (n,) [rad/s] of the demonstration."""
+    time_s = np.arange(round((_RUN_UP_S + _DWELL_S + _COAST_S) * _RATE_HZ)) / _RATE_HZ
     share = np.clip(time_s / _RUN_UP_S, 0.0, 1.0)
     coasting = np.clip((time_s - _RUN_UP_S - _DWELL_S) / _COAST_S, 0.0, 1.0)
     slowing = (_SLOWEST_RPM / _FASTEST_RPM) ** coasting
     speed_rpm = (_SLOWEST_RPM + share * (_FASTEST_RPM - _SLOWEST_RPM)) * slowing
-    stamp_ns = _START_NS + np.rint(time_s * NANOSECONDS).astype(np.int64)
+    stamp_ns = start_ns + np.rint(time_s * NANOSECONDS).astype(np.int64)
     return stamp_ns, np.asarray(rpm_to_rad_s(speed_rpm))
 
 
@@ -90,9 +92,8 @@ def _live(case: Path, profile: Path, out: Path, directory: Path) -> Path:
         replay = subprocess.run(
             [sys.executable, '-m', 'rotorsoil_ros.cli', 'replay', str(profile)],
             env=environment, check=False)
-    if replay.returncode != 0:
-        raise RotorSoilError(f'the replay failed; the node said, in {out / "node.log"}:\n'
-                             f'{(out / "node.log").read_text()}')
+        if replay.returncode != 0:
+            raise RotorSoilError(f'the replay failed; what the node said is in {out}/node.log')
     [log] = {path for path in set(out.iterdir()) - before if (path / 'metadata.yaml').exists()}
     return log
 
@@ -142,10 +143,12 @@ def _read(log: Path) -> _Answers:
                     np.array(rows))
 
 
-def _draw(case: Case, table: ResponseTable, answers: _Answers, out: Path) -> None:
+def _draw(
+    model: CoupledModel, table: ResponseTable, answers: _Answers, out: Path, *, case: Case,
+) -> None:
     out.mkdir(exist_ok=True)
     with progress('drawing') as report:
-        figures = list(all_figures(case, table))
+        figures = list(all_figures(case, model, table))
         figures.append(('demo', trend(
             1e-9 * (answers.stamp_ns - answers.stamp_ns[0]), answers.speed, answers.amplitude,
             channels=answers.channels, title=f'{MACHINE}: what the live node answered')))
@@ -155,7 +158,7 @@ def _draw(case: Case, table: ResponseTable, answers: _Answers, out: Path) -> Non
 
 
 def _summarise(case: Case, answers: _Answers, out: Path, log: Path) -> None:
-    sent = len(speed_profile()[0])
+    sent = len(speed_profile(0)[0])
     print(f'{sent} speeds sent over DDS, {len(answers.stamp_ns)} answered and logged')
     print('largest amplitudes, zero-to-peak:')
     names = [f'{bearing.name}_housing_{axis}' for bearing in case.rotor.bearings for axis in 'xz']

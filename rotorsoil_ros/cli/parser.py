@@ -114,6 +114,13 @@ def _add_case_verbs(verbs: _Verbs) -> None:
                       help='directory for the PNG files')
 
 
+    figures = _verb(verbs, 'figures', 'pictures:figures',
+                    "compute the seed paper's figures 6, 8 and 9", case=False)
+    figures.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
+                         help='directory for PNG and CSV files')
+    figures.add_argument('--cache', metavar='DIR', type=Path, help='directory of computed tables')
+
+
 def _add_live_verbs(verbs: _Verbs) -> None:
     predict = _verb(verbs, 'predict', 'bags:predict',
                     'answer every speed of a recorded profile, without a ROS graph')

@@ -1,9 +1,14 @@
-"""Every picture of a case."""
+"""Every picture of a case, and the figures of the seed paper."""
 
 from argparse import Namespace
+from importlib.resources import as_file, files
+from pathlib import Path
 
-from rotorsoil_ros.case import cache
+import numpy as np
+
+from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.case.plots import all_figures
 from rotorsoil_ros.cli.progress import progress
 
@@ -13,9 +18,49 @@ def plot(arguments: Namespace) -> int:
     case = load(arguments.case, arguments.overrides)
     arguments.output.mkdir(parents=True, exist_ok=True)
     with progress('drawing') as _:
-        table = cache.response_table(case, cache.directory(arguments.cache))
-        for name, figure in all_figures(case, table):
+        directory = cache.directory(arguments.cache)
+        model = models.coupled_model(case, directory)
+        table = models.response_table(case, model, directory)
+        for name, figure in all_figures(case, model, table):
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)
             print(path)
     return 0
+
+
+def figures(arguments: Namespace) -> int:
+    """Write figures 6, 8 and 9 as PNG and CSV, and what the paper's claims are held against."""
+    out: Path = arguments.output
+    out.mkdir(parents=True, exist_ok=True)
+    with as_file(files('rotorsoil_ros') / 'config' / 'paper_rotor.yaml') as path:
+        case = load(path, ['support.model=infinite_elements'])
+    with progress('solving and drawing') as _:
+        model = models.coupled_model(case, cache.directory(arguments.cache))
+        [infinite] = model.soil_models
+        numbers = claim_numbers(case, infinite)
+        for figure in paper_figures(case, infinite):
+            figure.figure.savefig(out / f'{figure.name}.png', dpi=150)
+            _write_columns(figure, out / f'{figure.name}.csv')
+            print(out / f'{figure.name}.png')
+            if figure.name != 'figure_6':
+                numbers += peak_numbers(figure)
+    lines = ['name,value,unit', *(f'{name},{value!r},{unit}' for name, value, unit in numbers)]
+    (out / 'numbers.csv').write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    print(out / 'numbers.csv')
+    return 0
+
+
+def _write_columns(figure: PaperFigure, path: Path) -> None:
+    header: list[str] = []
+    columns = []
+    for name, values in figure.columns.items():
+        if np.iscomplexobj(values):
+            header += [f'{name} re', f'{name} im']
+            columns += [values.real, values.imag]
+        else:
+            header.append(name)
+            columns.append(values.real)
+    rows = np.stack(columns, axis=1).tolist()
+    with path.open('w', encoding='utf-8') as stream:
+        stream.write(','.join(header) + '\n')
+        stream.writelines(','.join(map(repr, row)) + '\n' for row in rows)

@@ -1,24 +1,32 @@
 """What a case is, and what has been computed of it, in words."""
 
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 import time
 
-from rotorsoil_ros.case import cache
+from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.peaks import resonances
 from rotorsoil_ros.case.summary import derived_quantities, warnings
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.physics.infinite import InfiniteElementModel
+from rotorsoil_ros.physics.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.physics.response import ResponseTable
-from rotorsoil_ros.physics.units import rad_s_to_rpm
+from rotorsoil_ros.physics.soil import SoilModel
+from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
 
 
 def check(arguments: Namespace) -> int:
-    """Print what follows from a case, where it resonates, and what looks odd."""
+    """Print what follows from a case, where it is critical, and what looks odd."""
     case = load(arguments.case, arguments.overrides)
-    _print_table(derived_quantities(case))
+    directory = cache.directory(arguments.cache)
     with progress('solving') as _:
-        table = cache.response_table(case, cache.directory(arguments.cache))
+        model = models.coupled_model(case, directory)
+        criticals = critical_speeds(model, case.speed_range)
+        table = models.response_table(case, model, directory)
+    _print_table(derived_quantities(case, model.soil_models))
+    _print_table(_criticals(criticals))
     _print_table(_peaks(case, table))
     for warning in warnings(case):
         print(f'warning: {warning}')
@@ -29,17 +37,23 @@ def tabulate(arguments: Namespace) -> int:
     """Compute the tables of a case, or find them, and tell which."""
     case = load(arguments.case, arguments.overrides)
     directory = cache.directory(arguments.cache)
-    start = time.perf_counter()
-    table = cache.stored_response_table(case, directory)
-    how = 'loaded'
+    with progress('solving the soil') as _:
+        start = time.perf_counter()
+        model = models.coupled_model(case, directory)
+        soil_seconds = time.perf_counter() - start
+    table = models.stored_response_table(case, model, directory)
+    how, start = 'loaded', time.perf_counter()
     if table is None:
         how = 'computed'
         with progress('solving') as _:
-            table = cache.response_table(case, directory)
+            table = models.response_table(case, model, directory)
     seconds = time.perf_counter() - start
+    for foundation, soil in zip(model.foundations, model.soil_models, strict=True):
+        _print_table(_compliance(foundation.name, soil, directory))
+    if model.foundations:
+        print(f'{"soil ready in":40s} {soil_seconds:.3g} s')
     low, high = table.speed_range
     _print_table([
-        ('compliance table', f'none needed: the model {case.support.model} is a closed form'),
         ('response table', f'{how} in {seconds:.3g} s'),
         ('covers', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm, '
                    f'{len(table.channels)} channels, {len(table.planes)} unbalance planes'),
@@ -52,14 +66,38 @@ def tabulate(arguments: Namespace) -> int:
     return 0
 
 
+def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[str, str]]:
+    if not isinstance(soil, InfiniteElementModel):
+        yield f'{block}: compliance', f'closed form, {type(soil).__name__}'
+        return
+    table = soil.table
+    low, high = (rad_s_to_hz(omega) for omega in soil.omega_range)
+    yield f'{block}: compliance', (f'infinite elements, {table.geometry}, nu '
+                                   f'{table.poisson_ratio:g}, eta {table.loss_factor:g}')
+    yield f'{block}: covers', (f'a0 {table.a0_min:g} to {table.a0_max:g}, here {low:.4g} to '
+                               f'{high:.4g} Hz')
+    yield f'{block}: solves', f'{table.solves} of {table.unknowns} unknowns'
+    yield f'{block}: largest error', f'{table.measured_error:.2g}, at unseen frequencies'
+    yield f'{block}: file', str(cache.Cache(directory).path('compliance', models.key_of(soil)))
+
+
+def _criticals(criticals: Sequence[CriticalSpeed]) -> Iterable[tuple[str, str]]:
+    for critical in criticals:
+        yield (f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
+               f'{"forward" if critical.whirl > 0 else "backward"}, '
+               f'damping ratio {critical.damping_ratio:.2g}')
+    if not criticals:
+        yield 'critical speeds', 'none in the speed range'
+
+
 def _peaks(case: Case, table: ResponseTable) -> Iterable[tuple[str, str]]:
     moved = tuple(name for name in table.channels if name.rpartition('_')[2] in 'xyz')
     peaks = resonances(table.predictor(case.unbalance), moved)
     for peak in peaks:
-        yield (f'peak at {rad_s_to_rpm(peak.speed):.6g} rpm',
+        yield (f'response peak {rad_s_to_rpm(peak.speed):.6g} rpm',
                f'{1e6 * peak.amplitude:.4g} um zero-to-peak at {peak.channel}')
     if not peaks:
-        yield 'peaks', 'none in the speed range'
+        yield 'peaks of the response', 'none in the speed range'
 
 
 def _print_table(lines: Iterable[tuple[str, str]]) -> None:

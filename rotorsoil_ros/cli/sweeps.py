@@ -8,10 +8,12 @@ from typing import TextIO
 
 import numpy as np
 
+from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.cli.parser import Sweep
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import InputError
 from rotorsoil_ros.physics.foundation import Foundation
 from rotorsoil_ros.physics.soil import DOFS, SoilModel
@@ -24,7 +26,7 @@ _CHUNK = 4096
 def compliance(arguments: Namespace) -> int:
     """Write omega, a0 and every compliance that is not zero."""
     case = load(arguments.case, arguments.overrides)
-    foundation, model = _contact(case, arguments.foundation)
+    foundation, model = _contact(case, arguments.foundation, _model(case, arguments))
     per_a0 = (np.nan if case.soil is None else
               case.soil.shear_wave_speed / foundation.contact.characteristic_length)
     if arguments.a0 is not None and case.soil is None:
@@ -41,10 +43,16 @@ def compliance(arguments: Namespace) -> int:
     return 0
 
 
-def _contact(case: Case, name: str | None) -> tuple[Foundation, SoilModel]:
+def _model(case: Case, arguments: Namespace) -> CoupledModel:
+    return models.coupled_model(case, cache.directory(arguments.cache))
+
+
+def _contact(
+    case: Case, name: str | None, model: CoupledModel,
+) -> tuple[Foundation, SoilModel]:
     """Return the block of that name, or the only one, and what it stands on."""
-    contacts = {foundation.name: (foundation, model) for foundation, model
-                in zip(case.foundations, case.soil_models(), strict=True)}
+    contacts = {foundation.name: (foundation, soil) for foundation, soil
+                in zip(model.foundations, model.soil_models, strict=True)}
     if name is None and len(contacts) == 1:
         name = next(iter(contacts))
     if name is None or name not in contacts:
@@ -56,7 +64,7 @@ def _contact(case: Case, name: str | None) -> tuple[Foundation, SoilModel]:
 def response(arguments: Namespace) -> int:
     """Write the displacement of every channel, solved at every speed."""
     case = load(arguments.case, arguments.overrides)
-    model = case.coupled_model()
+    model = _model(case, arguments)
     speed = (rpm_to_rad_s(_values(arguments.rpm)) if arguments.hz is None
              else hz_to_rad_s(_values(arguments.hz)))
 

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 
 import rotorsoil_ros
-from rotorsoil_ros.case import cache, config
+from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.physics.arrays import ComplexArray
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.infinite import InfiniteElementModel
 from rotorsoil_ros.physics.response import ResponseTable
 
 UNITS = {
@@ -22,9 +24,10 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A case with its response table."""
+    """A case with its models and its response table."""
 
     case: config.Case
+    model: CoupledModel
     table: ResponseTable
 
     @classmethod
@@ -33,13 +36,23 @@ class Machine:
     ) -> 'Machine':
         """Read a case and load its table, computing it where the cache has none."""
         case = config.load(case_file, overrides)
-        return cls(case, cache.response_table(case, cache.directory(cache_directory)))
+        directory = cache.directory(cache_directory)
+        model = models.coupled_model(case, directory)
+        return cls(case, model, models.response_table(case, model, directory))
+
+    def _compliance_keys(self) -> dict[str, str]:
+        return {f'compliance of {foundation.name}': models.key_of(soil)
+                for foundation, soil in zip(self.model.foundations, self.model.soil_models,
+                                            strict=True)
+                if isinstance(soil, InfiniteElementModel)}
 
     def description(self, name: str, unbalance: ComplexArray) -> Mapping[str, object]:
         """Return what the predictions under this name and this unbalance rest on."""
         return {
             'machine': name, 'case': self.case.name, 'version': rotorsoil_ros.__version__,
-            'tables': {'response': self.table.key}, 'accuracy': self.table.accuracy,
+            'support': self.case.support.model,
+            'tables': {'response': self.table.key, **self._compliance_keys()},
+            'accuracy': self.table.accuracy,
             'speed_range_rad_s': list(self.table.speed_range),
             'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
             'unbalance': {

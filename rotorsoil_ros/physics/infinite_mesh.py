@@ -27,7 +27,7 @@ LARGEST_CELL = 0.2
 CELL_TIMES_A0 = 1.3
 # Below a0 = 0.05 the radiation of a rocking or twisting disc is less than 1e-4 of its compliance;
 # only a wider near field separates it from the error of the static far field.
-WIDTHS = ((0.05, 1.4), (0.02, 1.8), (0.0, 2.2))
+WIDTHS = ((0.05, 1.4), (0.02, 1.6), (0.0, 2.0))
 
 # The first two rings around the edge shrink slowly because a wave still has to be resolved there,
 # the others fast because only the singularity r^(1/2 +- i eps) is left.

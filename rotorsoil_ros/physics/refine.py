@@ -90,7 +90,7 @@ def evaluate(
     np.multiply.accumulate(powers, axis=0, out=powers)
     if len(place) == 1:  # the live node: no sorting, few calls
         terms: FloatArray = powers * coefficients[index[0]]
-        return terms.sum(axis=0, keepdims=True)
+        return np.asarray(terms.sum(axis=0, keepdims=True))
     values = np.empty((len(place), coefficients.shape[2]))
     for piece, run in _runs(index):
         values[run] = _sum(powers[:, run, None], coefficients[piece])
@@ -99,7 +99,7 @@ def evaluate(
 
 def _sum(powers: FloatArray, rows: FloatArray) -> FloatArray:
     """Return the sum of powers (d, n, 1) times rows (d, w), (n, w)."""
-    total = powers[0] * rows[0]
+    total: FloatArray = powers[0] * rows[0]
     term = np.empty_like(total)
     for power, row in zip(powers[1:], rows[1:], strict=True):
         np.multiply(power, row, out=term)

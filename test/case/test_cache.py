@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.case import cache
-from rotorsoil_ros.case.cache import Cache, content_key, response_key, response_table
+from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import load
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
@@ -157,34 +157,3 @@ def test_directory_is_the_chosen_one_then_the_environment_then_the_users(tmp_pat
     assert cache.directory() == Path('/b/rotorsoil')
     monkeypatch.delenv('XDG_CACHE_HOME')
     assert cache.directory() == Path('/c/.cache/rotorsoil')
-
-
-def test_table_from_the_cache_is_the_computed_one(tmp_path, monkeypatch):
-    case = load(PAPER, ['speed_range_rpm=[600, 1200]'])
-    computed = response_table(case, tmp_path)
-
-    def fail(*_):
-        raise AssertionError('computed again')
-
-    monkeypatch.setattr(cache.ResponseTable, 'build', fail)
-    loaded = response_table(case, tmp_path)
-    assert loaded.key == computed.key == response_key(case)
-    speed = np.linspace(*case.speed_range, 7)
-    np.testing.assert_array_equal(
-        loaded.predictor(case.unbalance).predict(speed).displacement,
-        computed.predictor(case.unbalance).predict(speed).displacement)
-
-
-@pytest.mark.parametrize('setting, same', [
-    ('name=other', True), ('unbalances.0.moment=3e-5', True),
-    ('soil.shear_modulus=47e6', False), ('support.model=rigid', False),
-    ('foundations.0.mass=43', False), ('rotor.bearings.0.damping.xx=501', False),
-    ('speed_range_rpm=[60, 9001]', False)])
-def test_response_key_knows_everything_but_the_unbalance(setting, same):
-    assert (response_key(load(PAPER, [setting])) == response_key(load(PAPER))) is same
-
-
-def test_soil_below_a_rigid_support_does_not_matter():
-    rigid = ['support.model=rigid']
-    assert response_key(load(PAPER, rigid)) == response_key(
-        load(PAPER, [*rigid, 'soil.shear_modulus=1e6']))

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.models import coupled_model, soil_models
 from rotorsoil_ros.physics.cone import ConeModel
 from rotorsoil_ros.physics.errors import InputError
 from rotorsoil_ros.physics.soil import Circle, Rectangle, RigidSoil
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
+NO_CACHE = Path('no cache is needed for cones')
 
 
 def test_speeds_are_rad_per_second():
@@ -35,8 +37,8 @@ def test_each_foundation_has_the_soil_of_its_own_contact():
         f'foundations=[{{name: block, half_width: 0.5, half_length: 0.7, mass: 42, '
         f'centre_of_gravity_height: 0.1, inertia: [1, 2, 3]}}, {second}]'])
     assert case.soil is not None
-    assert case.soil_models() == (ConeModel(case.soil, Rectangle(0.5, 0.7)),
-                                  ConeModel(case.soil, Circle(0.3)))
+    assert soil_models(case, NO_CACHE) == (ConeModel(case.soil, Rectangle(0.5, 0.7)),
+                                           ConeModel(case.soil, Circle(0.3)))
 
 
 def test_block_stands_under_the_middle_of_its_bearings_by_default():
@@ -55,12 +57,12 @@ def test_rigid_support_needs_neither_soil_nor_foundations():
         'support.model=rigid', 'soil=', 'foundations=[]',
         'rotor.bearings.0.foundation=', 'rotor.bearings.1.foundation='])
     assert case.soil is None
-    assert case.soil_models() == ()
+    assert soil_models(case, NO_CACHE) == ()
     assert case.rotor.bearings[0].foundation is None
 
 
 def test_rigid_support_takes_a_case_with_blocks_as_it_is():
-    assert load(PAPER, ['support.model=rigid']).soil_models() == (RigidSoil(),)
+    assert soil_models(load(PAPER, ['support.model=rigid']), NO_CACHE) == (RigidSoil(),)
 
 
 def test_section_may_be_conical_of_its_own_material_and_carry_mass():
@@ -87,7 +89,7 @@ def test_cross_terms_of_a_bearing_are_force_first():
 
 def test_probe_is_a_channel():
     case = load(PAPER, ['rotor.probes=[{name: probe_1, position: 0.1}]'])
-    assert 'probe_1_z' in case.coupled_model().channels
+    assert 'probe_1_z' in coupled_model(case, NO_CACHE).channels
 
 
 @pytest.mark.parametrize('setting, problem', [
