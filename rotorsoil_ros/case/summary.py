@@ -11,9 +11,11 @@ from rotorsoil_ros.physics.units import rad_s_to_rpm
 
 # What the design note measured of cones against rigorous solutions (soil_and_foundation.md, 1.2
 # and 1.3): beyond these they are off by more than a quarter.
+_SMALLEST_A0 = 1.5
 _LARGEST_A0 = 6.0
 _LARGEST_A0_INCOMPRESSIBLE = 2.0
 _LARGEST_ASPECT = 2.0
+_LARGEST_POISSON_RATIO = 0.45
 
 
 def derived_quantities(
@@ -47,11 +49,15 @@ def _of_foundation(
             f'{foundation.mass / (case.soil.density * radius**3):.4g}')
         low, high = (a0(case.soil, foundation, speed) for speed in case.speed_range)
         yield f'{name}: a0', f'{low:.3g} to {high:.3g}'
-    static = np.diagonal(model.compliance(np.zeros(1))[0])
-    for dof, compliance in zip(DOFS, static, strict=True):
+    # A strip gives way without bound at rest: its stiffness is told where the machine starts.
+    where, omega = 'static', 0.0
+    if case.support.model == 'infinite_elements' and case.support.geometry != 'disc':
+        where, omega = 'slowest', case.speed_range[0]
+    for dof, compliance in zip(DOFS, np.diagonal(model.compliance(np.array([omega]))[0]),
+                               strict=True):
         unit = 'N/m' if len(dof) == 1 else 'N m/rad'
         stiffness = 'rigid' if compliance == 0.0 else f'{(1.0 / compliance).real:.4g} {unit}'
-        yield f'{name}: static stiffness {dof}', stiffness
+        yield f'{name}: {where} stiffness {dof}', stiffness
 
 
 def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
@@ -72,21 +78,37 @@ def warnings(case: Case) -> Iterator[str]:
         if large > (1.0 + 1e-9) * (small + medium):
             yield (f'{foundation.name}: inertia {large:g} kg m^2 about one axis is more than '
                    'that about both others, which no body has')
-        if case.soil is not None and case.support.model == 'cone':
-            yield from _of_cones(case.soil, foundation, highest_omega=case.speed_range[1])
+        if case.soil is not None and case.support.model != 'rigid':
+            yield from _of_soil(case, case.soil, foundation)
 
 
-def _of_cones(soil: Soil, foundation: Foundation, *, highest_omega: float) -> Iterator[str]:
-    highest = a0(soil, foundation, highest_omega)
+def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:
+    if case.support.model == 'cone':
+        yield from _of_cones(soil, foundation, speed_range=case.speed_range)
+    elif soil.poisson_ratio > _LARGEST_POISSON_RATIO:
+        yield (f'soil: nu is {soil.poisson_ratio:g}; above {_LARGEST_POISSON_RATIO:g} infinite '
+               'elements are within 0.5 % only up to a0 = 6')
+    if case.support.geometry != 'disc':
+        yield (f'{foundation.name}: a strip radiates more than a block of finite length and '
+               'holds y, rx and rz; geometry disc is the three-dimensional one')
+    elif isinstance(foundation.contact, Rectangle):
+        sides = foundation.contact.half_width, foundation.contact.half_length
+        aspect = max(sides) / min(sides)
+        if aspect > _LARGEST_ASPECT:
+            yield (f'{foundation.name}: contact is {aspect:.3g} times as long as wide; above '
+                   f'{_LARGEST_ASPECT:g} discs of equal area are off by more than 10 %')
+
+
+def _of_cones(
+    soil: Soil, foundation: Foundation, *, speed_range: tuple[float, float],
+) -> Iterator[str]:
+    lowest, highest = (a0(soil, foundation, speed) for speed in speed_range)
+    if lowest < _SMALLEST_A0:
+        yield (f'{foundation.name}: a0 starts at {lowest:.3g}; below {_SMALLEST_A0:g} cones damp '
+               'too much, vertically by a quarter, rocking up to twofold')
     limit = _LARGEST_A0
     if soil.poisson_ratio > 1.0 / 3.0:
         limit = _LARGEST_A0_INCOMPRESSIBLE
     if highest > limit:
         yield (f'{foundation.name}: a0 reaches {highest:.3g}; above {limit:g} cones are off by '
                'more than a quarter for this soil')
-    if isinstance(foundation.contact, Rectangle):
-        sides = foundation.contact.half_width, foundation.contact.half_length
-        aspect = max(sides) / min(sides)
-        if aspect > _LARGEST_ASPECT:
-            yield (f'{foundation.name}: contact is {aspect:.3g} times as long as wide; above '
-                   f'{_LARGEST_ASPECT:g} discs of equal area are off by more than 10 %')

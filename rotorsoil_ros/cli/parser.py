@@ -45,6 +45,32 @@ class Sweep:
         return sweep
 
 
+def _rpm(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not 0.0 <= speed < math.inf:
+        raise argparse.ArgumentTypeError(f'must be a speed >= 0 rpm, got {text!r}')
+    return speed
+
+
+def _order(text: str) -> float:
+    try:
+        order = float(text)
+    except ValueError:
+        order = math.nan
+    if not 0.0 < order < math.inf:
+        raise argparse.ArgumentTypeError(f'must be a multiple > 0 of the speed, got {text!r}')
+    return order
+
+
+def _modes(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text[:4]) and len(text) <= 3):
+        raise argparse.ArgumentTypeError(f'must be 1 to 999 modes, got {text!r}')
+    return int(text)
+
+
 def _rate(text: str) -> float:
     try:
         rate = float(text)
@@ -108,17 +134,48 @@ def _add_case_verbs(verbs: _Verbs) -> None:
     sweep = response.add_mutually_exclusive_group(required=True)
     sweep.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse, help='rotor speed [rpm]')
     sweep.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, help='rotor speed [turns/s]')
+    response.add_argument('--order', metavar='N', type=_order,
+                          help='a force of 1 N at N times the speed instead of the unbalance; '
+                               'needs --force')
+    response.add_argument('--force', metavar='CHANNEL',
+                          help='where that force acts, as in disc_1_z (a block that turns, as in '
+                               'block_ry: 1 N m)')
     _add_output(response)
+    _add_modal_verbs(verbs)
     plot = _verb(verbs, 'plot', 'pictures:plot', 'draw every picture of a case')
     plot.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
                       help='directory for the PNG files')
-
-
     figures = _verb(verbs, 'figures', 'pictures:figures',
                     "compute the seed paper's figures 6, 8 and 9", case=False)
     figures.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
                          help='directory for PNG and CSV files')
     figures.add_argument('--cache', metavar='DIR', type=Path, help='directory of computed tables')
+
+
+def _add_modal_verbs(verbs: _Verbs) -> None:
+    frf = _verb(verbs, 'frf', 'sweeps:frf',
+                'write the response of every channel to a harmonic force of 1 N as CSV')
+    frf.add_argument('--rpm', metavar='R', type=_rpm, required=True,
+                     help='rotor speed [rpm]; 0 is an impact test at rest')
+    frf.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, required=True,
+                     help='frequency of the force [Hz]')
+    frf.add_argument('--force', metavar='CHANNEL', required=True,
+                     help='where the force acts, as in disc_1_z (a block that turns, as in '
+                          'block_ry: 1 N m)')
+    _add_output(frf)
+    campbell = _verb(verbs, 'campbell', 'modal:campbell',
+                     'write natural frequencies, damping and whirl over the speed as CSV')
+    campbell.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse,
+                          help='rotor speed [rpm] (with --criticals: A to B; default: the speed '
+                               'range of the case)')
+    campbell.add_argument('--modes', metavar='K', type=_modes, default=8,
+                          help='how many modes at each speed, the lowest (default: %(default)s)')
+    campbell.add_argument('--criticals', action='store_true',
+                          help='write the critical speeds instead')
+    campbell.add_argument('--running', metavar='R', type=_rpm,
+                          help='with --criticals: running speed [rpm], from which separation '
+                               'margins (API 617) are written too')
+    _add_output(campbell)
 
 
 def _add_live_verbs(verbs: _Verbs) -> None:

@@ -17,6 +17,10 @@ from rotorsoil_ros.physics.soil import SoilModel
 from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
 
 
+# Amplification factor below which a critical speed needs no margin (API 617).
+_FELT = 2.5
+
+
 def check(arguments: Namespace) -> int:
     """Print what follows from a case, where it is critical, and what looks odd."""
     case = load(arguments.case, arguments.overrides)
@@ -41,8 +45,8 @@ def tabulate(arguments: Namespace) -> int:
         start = time.perf_counter()
         model = models.coupled_model(case, directory)
         soil_seconds = time.perf_counter() - start
-    table = models.stored_response_table(case, model, directory)
     how, start = 'loaded', time.perf_counter()
+    table = models.stored_response_table(case, model, directory)
     if table is None:
         how = 'computed'
         with progress('solving') as _:
@@ -85,7 +89,8 @@ def _criticals(criticals: Sequence[CriticalSpeed]) -> Iterable[tuple[str, str]]:
     for critical in criticals:
         yield (f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
                f'{"forward" if critical.whirl > 0 else "backward"}, '
-               f'damping ratio {critical.damping_ratio:.2g}')
+               f'damping ratio {critical.damping_ratio:.2g}'
+               + ('' if critical.amplification_factor >= _FELT else ', hardly felt'))
     if not criticals:
         yield 'critical speeds', 'none in the speed range'
 

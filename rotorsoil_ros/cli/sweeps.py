@@ -31,8 +31,8 @@ def compliance(arguments: Namespace) -> int:
               case.soil.shear_wave_speed / foundation.contact.characteristic_length)
     if arguments.a0 is not None and case.soil is None:
         raise InputError(f'{case.path}: soil: is missing; --a0 needs its c_s, --hz does not')
-    omega = (hz_to_rad_s(_values(arguments.hz)) if arguments.a0 is None
-             else per_a0 * _values(arguments.a0))
+    omega = (hz_to_rad_s(values(arguments.hz)) if arguments.a0 is None
+             else per_a0 * values(arguments.a0))
     moving = np.any(model.compliance(omega) != 0.0, axis=0)
     names = [DOFS[i] + DOFS[j] for i, j in zip(*np.nonzero(moving), strict=True)]
 
@@ -65,17 +65,47 @@ def response(arguments: Namespace) -> int:
     """Write the displacement of every channel, solved at every speed."""
     case = load(arguments.case, arguments.overrides)
     model = _model(case, arguments)
-    speed = (rpm_to_rad_s(_values(arguments.rpm)) if arguments.hz is None
-             else hz_to_rad_s(_values(arguments.hz)))
+    order, channel = arguments.order, arguments.force
+    if (order is None) is not (channel is None):
+        raise InputError('--order and --force belong together: the unbalance of a case excites '
+                         'the speed itself')
+    _require_channel(model, channel)
+    speed = (rpm_to_rad_s(values(arguments.rpm)) if arguments.hz is None
+             else hz_to_rad_s(values(arguments.hz)))
 
     def rows(part: FloatArray) -> tuple[FloatArray, ComplexArray]:
-        return part[:, None], model.unbalance_response(part, case.unbalance).displacement
+        if order is None:
+            return part[:, None], model.unbalance_response(part, case.unbalance).displacement
+        found = model.harmonic_response(part, order=order, channel=channel)
+        return part[:, None], found.displacement
 
     _write(arguments.output, ['speed_rad_s'], model.channels, speed, rows)
     return 0
 
 
-def _values(sweep: Sweep) -> FloatArray:
+def frf(arguments: Namespace) -> int:
+    """Write the displacement of every channel per unit force, at one speed of the rotor."""
+    model = _model(load(arguments.case, arguments.overrides), arguments)
+    _require_channel(model, arguments.force)
+    speed = rpm_to_rad_s(arguments.rpm)
+
+    def rows(part: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        found = model.frequency_response(part, speed=speed, channel=arguments.force)
+        return part[:, None], found.displacement
+
+    _write(arguments.output, ['omega_rad_s'], model.channels,
+           hz_to_rad_s(values(arguments.hz)), rows)
+    return 0
+
+
+def _require_channel(model: CoupledModel, channel: str | None) -> None:
+    """Refuse a wrong channel before a file is begun."""
+    if channel is not None and channel not in model.channels:
+        raise InputError(f'--force must be one of {", ".join(model.channels)}, got {channel}')
+
+
+def values(sweep: Sweep) -> FloatArray:
+    """Return the values of a sweep, (count,)."""
     return np.linspace(sweep.start, sweep.stop, sweep.count)
 
 
@@ -85,7 +115,7 @@ def _write(
 ) -> None:
     """Write a header and, chunk by chunk, real and complex columns in full precision."""
     header = [*real, *(f'{name}_{part}' for name in complexes for part in ('re', 'im'))]
-    with _opened(target) as stream, progress('solving') as report:
+    with opened(target) as stream, progress('solving') as report:
         stream.write(','.join(header) + '\n')
         for start in range(0, len(sweep), _CHUNK):
             keys, values = rows(sweep[start:start + _CHUNK])
@@ -95,7 +125,7 @@ def _write(
 
 
 @contextmanager
-def _opened(target: str) -> Iterator[TextIO]:
+def opened(target: str) -> Iterator[TextIO]:
     """Open a file for writing; `-` is standard output."""
     if target == '-':
         yield sys.stdout

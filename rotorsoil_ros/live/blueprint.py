@@ -16,7 +16,7 @@ PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING = (
 ON_SHAFT, ON_GROUND = (PROBES, DISCS, JOURNALS), (HOUSINGS, BLOCK, ROCKING)
 COLOURS = ((31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (148, 103, 189),
            (140, 86, 75), (227, 119, 194), (127, 127, 127), (188, 189, 34), (23, 190, 207))
-FROM = (1.5, -0.9, 0.7)  # where the eye is, in extents of the machine
+FROM = (1.2, -0.75, 0.6)  # where the eye is, in extents of the machine
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def _trend_tabs(shown: Sequence[Trend], kinds: Sequence[str], quantity: str) -> 
 
 def _picture_column(name: str, scene: Scene) -> rrb.Vertical:
     picture = rr.new_entity_path([name, 'picture'])
-    target = np.array([0.0, 0.5 * scene.length, 0.6 * scene.shaft_height])
+    target = np.array([0.0, 0.5 * scene.length, 0.35 * scene.shaft_height])
     eye = rrb.EyeControls3D(
         position=target + scene.extent * np.array(FROM), look_target=target,
         eye_up=(0.0, 0.0, 1.0))

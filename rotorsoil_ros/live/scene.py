@@ -16,7 +16,7 @@ from rotorsoil_ros.physics.soil import DOFS, Rectangle
 SHAFT_POINTS = 61
 ORBIT_POINTS = 33
 LARGEST_SHARE = 0.15  # of the shaft length, that the largest drawn displacement may take
-SMALLEST_SHARE = 0.03  # below it the scale is chosen anew
+SMALLEST_SHARE = 0.05  # below it the scale is chosen anew
 BLOCK_SHARE = 0.45  # of the shaft height, that a drawn block takes: its real height is not known
 
 
@@ -85,7 +85,7 @@ class Scene:
     @property
     def extent(self) -> float:
         """How large the whole is [m]."""
-        blocks = [max(block.half_width, block.half_length) for block in self.blocks]
+        blocks = [2.0 * max(block.half_width, block.half_length) for block in self.blocks]
         return max(self.length, self.shaft_height, *blocks)
 
     def stations_at(self, displacement: ComplexArray, turn: FloatArray) -> FloatArray:

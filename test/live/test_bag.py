@@ -8,7 +8,10 @@ import zlib
 
 from hypothesis import given, HealthCheck, settings, strategies as some
 from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
 from mcap.reader import make_reader, NonSeekingReader
+from mcap.records import Chunk, DataEnd, MessageIndex
+from mcap.stream_reader import get_chunk_data_stream, StreamReader
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
@@ -88,7 +91,7 @@ def test_the_reference_library_finds_every_checksum_right(bag):
     bag.write(joint_records(8990))
     bag.write(joint_records(10, start=START + 8990 * 10**6))
     bag.write(joint_records(2000))  # more than a chunk
-    bag.write(float_records(1))
+    bag.write(float_records(1, start=START + 5))
     bag.close()
     content = (bag.path / 'run_0.mcap').read_bytes()
     indexed = make_reader(io.BytesIO(content), validate_crcs=True)
@@ -100,8 +103,26 @@ def test_the_reference_library_finds_every_checksum_right(bag):
     assert summary.statistics.message_end_time == START + 8999 * 10**6
     assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 1
     assert indexed.get_header().profile == 'ros2'
+    records = list(StreamReader(io.BytesIO(content), emit_chunks=True).records)
+    assert all(record.data_section_crc for record in records if isinstance(record, DataEnd))
     start, _, crc = struct.unpack('<QQI', content[-28:-8])
     assert zlib.crc32(content[start:-12]) == crc
+
+
+def test_the_index_of_a_chunk_points_at_its_messages(bag):
+    bag.write(joint_records(3))
+    bag.write(float_records(2))
+    bag.close()
+    with (bag.path / 'run_0.mcap').open('rb') as stream:
+        records = list(StreamReader(stream, emit_chunks=True).records)
+    chunk, = (record for record in records if isinstance(record, Chunk))
+    body = get_chunk_data_stream(chunk)[0].read(chunk.uncompressed_size)
+    entries = [(index.channel_id, *entry) for index in records
+               if isinstance(index, MessageIndex) for entry in index.records]
+    assert len(entries) == 5
+    for channel, stamp, offset in entries:
+        opcode, _, said_channel, _, said_stamp = struct.unpack_from('<BQHIQ', body, offset)
+        assert (opcode, said_channel, said_stamp) == (Opcode.MESSAGE, channel, stamp)
 
 
 def test_metadata_is_that_of_rosbag2(bag):

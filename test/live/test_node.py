@@ -1,11 +1,16 @@
 """The node on a real graph: what it answers, when it is silent, what it refuses."""
 
+from contextlib import suppress
+import io
 import json
 import math
+from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader
 import numpy as np
 import pytest
 from rcl_interfaces.srv import DescribeParameters
@@ -15,6 +20,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
+from rotorsoil_ros.case.config import load
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.messages import Vectors
 from rotorsoil_ros.live.node import RotorsoilNode
@@ -222,6 +228,33 @@ def test_unbalance_acts_on_the_next_message_and_the_model_says_so(bench, machine
         'moment_kg_m': 1.0, 'phase_rad': 0.5 * math.pi}, 'the new model')
 
 
+def test_the_unbalance_of_the_case_reaches_the_table_to_the_last_bit(bench, tmp_path):
+    case = tmp_path / 'case.yaml'
+    case.write_text(Path(bench.case_file).read_text().replace(
+        'unbalances:', 'unbalances:\n  - {disc: disc_2, moment: 1.1e-5, phase: 0.2}'))
+    node = bench.active('fan', fan__case=str(case))
+    expected = load(case).unbalance
+    moment, phase = abs(expected[1]), np.angle(expected[1])
+    # Why it matters: through modulus and phase another number comes back.
+    assert complex(moment * math.cos(phase), moment * math.sin(phase)) != expected[1]
+    assert node.settings.unbalance('fan', ('disc_1', 'disc_2')).tobytes() == expected.tobytes()
+
+
+def test_the_log_reaches_the_disk_every_second(bench, tmp_path):
+    bench.active('fan', log__directory=str(tmp_path))
+    bench.speaker(listeners=())(joint_state([300.0]))
+
+    def is_on_disk():
+        content = io.BytesIO((tmp_path / 'run' / 'run_0.mcap').read_bytes())
+        topics = set()
+        with suppress(EndOfFile):  # nobody has finished the file
+            for _, channel, _ in NonSeekingReader(content).iter_messages(log_time_order=False):
+                topics.add(channel.topic)
+        return '/rotorsoil/fan/amplitude' in topics
+
+    bench.graph.until(is_on_disk, 'the flush')
+
+
 @pytest.mark.parametrize('name, value, reason', [
     ('fan.unbalance.disc_1.moment', math.nan, ''),
     ('fan.unbalance.disc_1.moment', math.inf, ''),
@@ -270,12 +303,14 @@ def test_life_cycle_services_configure_silence_and_release(bench):
     publish(joint_state([300.0], stamp=STAMP + 2))
     bench.graph.until(lambda: len(amplitude) == 2, 'the answer after the silence')
     assert stamp_ns(amplitude[1]) == STAMP + 2
+    assert node._watches[0].monitor.health.counts['received'] == 2
     assert bench.change(Transition.TRANSITION_DEACTIVATE)
     assert bench.change(Transition.TRANSITION_CLEANUP)
     assert bench.state() == 'unconfigured'
     assert not node.has_parameter('fan.unbalance.disc_1.moment')
     bench.graph.until(lambda: not bench.probe.count_subscribers('/fan/joint_states'), 'release')
     assert bench.change(Transition.TRANSITION_CONFIGURE)
+    assert node.has_parameter('fan.unbalance.disc_1.moment')
     assert bench.change(Transition.TRANSITION_ACTIVATE)
     assert bench.change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert bench.state() == 'finalized'

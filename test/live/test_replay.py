@@ -135,7 +135,7 @@ def test_replay_brings_its_own_context_and_gives_up_when_nobody_listens(
 def test_replay_ends_with_its_context(graph, profile):
     heard = []
     graph.probe.create_subscription(JointState, '/fan/joint_states', heard.append, 10)
-    played = InThread(replay, profile, rate=0.01, context=graph.context)
+    played = InThread(replay, profile, rate=1e-4, context=graph.context)
     graph.until(lambda: heard, 'the first speed')
     graph.context.try_shutdown()
     played.thread.join(5.0)

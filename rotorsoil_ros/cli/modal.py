@@ -1,0 +1,71 @@
+"""Natural frequencies and critical speeds, as CSV."""
+
+from argparse import Namespace
+from collections.abc import Iterable
+
+from rotorsoil_ros.case import cache, models
+from rotorsoil_ros.case.config import load
+from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.cli.sweeps import opened, values
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.physics.modes import campbell as campbell_of, critical_speeds, CriticalSpeed
+from rotorsoil_ros.physics.units import rpm_to_rad_s
+
+
+def campbell(arguments: Namespace) -> int:
+    """Write every mode at every speed, or the speeds that excite one."""
+    case = load(arguments.case, arguments.overrides)
+    model = models.coupled_model(case, cache.directory(arguments.cache))
+    if arguments.criticals:
+        return _criticals(arguments, model, case.speed_range)
+    if arguments.rpm is None:
+        raise InputError('--rpm is missing; only --criticals has the speed range of the case')
+    if arguments.running is not None:
+        raise InputError('--running needs --criticals')
+    speed = rpm_to_rad_s(values(arguments.rpm))
+    with progress('solving') as _:
+        found = campbell_of(model, speed, arguments.modes)
+    # A speed may have fewer modes than wanted.
+    rows = [(at, mode + 1, *numbers) for at, *of_speed in zip(
+                speed.tolist(), found.omega.tolist(), found.damping_ratio.tolist(),
+                found.whirl.tolist(), strict=True)
+            for mode, numbers in enumerate(zip(*of_speed, strict=True)) if numbers[2] != 0]
+    _write(arguments.output, ['speed_rad_s', 'mode', 'omega_rad_s', 'damping_ratio', 'whirl'],
+           rows)
+    return 0
+
+
+def _criticals(
+    arguments: Namespace, model: CoupledModel, speed_range: tuple[float, float],
+) -> int:
+    if arguments.rpm is not None:
+        low, high = arguments.rpm.start, arguments.rpm.stop
+        if not low < high:
+            raise InputError(f'--rpm must rise with --criticals, got {low:g} to {high:g} rpm')
+        speed_range = rpm_to_rad_s(low), rpm_to_rad_s(high)
+    running = arguments.running
+    if running is not None and not running > 0.0:
+        raise InputError(f'--running must be > 0 rpm, got {running:g}')
+    with progress('solving') as _:
+        criticals = critical_speeds(model, speed_range)
+    header = ['speed_rad_s', 'whirl', 'damping_ratio']
+    rows: list[tuple[float, ...]] = [
+        (critical.speed, critical.whirl, critical.damping_ratio) for critical in criticals]
+    if running is not None:
+        header += ['amplification_factor', 'separation_margin', 'required_margin']
+        rows = [(*row, *_margins(critical, rpm_to_rad_s(running)))
+                for row, critical in zip(rows, criticals, strict=True)]
+    _write(arguments.output, header, rows)
+    return 0
+
+
+def _margins(critical: CriticalSpeed, running: float) -> tuple[float, float, float]:
+    return (critical.amplification_factor, critical.separation_margin(running),
+            critical.required_margin(running))
+
+
+def _write(target: str, header: Iterable[str], rows: Iterable[tuple[float, ...]]) -> None:
+    with opened(target) as stream:
+        stream.write(','.join(header) + '\n')
+        stream.writelines(','.join(map(repr, row)) + '\n' for row in rows)
