@@ -36,7 +36,8 @@ def machine(elements: int) -> CoupledModel:
     """Return the seed paper's rotor on one block on soil."""
     shaft = ShaftSection(LENGTH, (DIAMETER, DIAMETER), (0.0, 0.0), elements,
                          Material(2.09e11, 0.3, 7920.0))
-    discs = (Disc('disc_1', LENGTH / 4.0, 0.7, 1e-3, 2e-3), Disc('disc_2', LENGTH, 1.6, 3.2e-3, 6.4e-3))
+    discs = (Disc('disc_1', LENGTH / 4.0, 0.7, 1e-3, 2e-3),
+             Disc('disc_2', LENGTH, 1.6, 3.2e-3, 6.4e-3))
     bearings = tuple(Bearing(name, place, 'block', 1e9 * np.eye(2), 5e2 * np.eye(2))
                      for name, place in (('bearing_1', 0.0), ('bearing_2', 0.75 * LENGTH)))
     contact = Rectangle(0.5, 0.5)
@@ -68,7 +69,8 @@ def main() -> None:
         speed = np.linspace(*SPEED_RANGE, count)
         model = machine(28)
         cold = seconds(lambda speed=speed: machine(28).unbalance_response(speed, UNBALANCE), 7)
-        warm = seconds(lambda speed=speed, model=model: model.unbalance_response(speed, UNBALANCE), 15)
+        warm = seconds(
+            lambda speed=speed, model=model: model.unbalance_response(speed, UNBALANCE), 15)
         slow = seconds(lambda speed=speed, model=model: dense(model, speed), 2)
         print(f'  {count:5d} speeds: {1e3 * warm:8.2f} ms ({1e3 * cold:.2f} ms from the case on), '
               f'dense {1e3 * slow:8.0f} ms: {slow / warm:.0f} times')

@@ -9,7 +9,7 @@ from rotorsoil_ros.physics.arrays import FloatArray
 
 # Five points integrate degree 9: the highest here is 8, the polar inertia of a conical element
 # (degree 4) times two rotations (degree 2 each).
-_GAUSS_POINTS = 5
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +147,8 @@ def plane_matrices(elements: BeamElements) -> tuple[FloatArray, FloatArray, Floa
     Przemieniecki (1968), sec. 11.
 
     """
-    points, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
-    place = 0.5 * (points + 1.0)
-    step = 0.5 * weights[None, :] * elements.length[:, None]
+    place = 0.5 * (_POINTS + 1.0)
+    step = 0.5 * _WEIGHTS[None, :] * elements.length[:, None]
     left, right = 1.0 - place[None, :], place[None, :]
     outer = elements.outer_diameter[:, :1] * left + elements.outer_diameter[:, 1:] * right
     inner = elements.inner_diameter[:, :1] * left + elements.inner_diameter[:, 1:] * right

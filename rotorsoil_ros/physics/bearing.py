@@ -80,7 +80,8 @@ class Pedestal:
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the deflection per force without the mass, (n, 2, 2) [m/N]."""
-        return np.linalg.inv(self.stiffness + 1j * omega[:, None, None] * self.damping)
+        dynamic: ComplexArray = self.stiffness + 1j * omega[:, None, None] * self.damping
+        return np.asarray(np.linalg.inv(dynamic))
 
 
 @dataclass(frozen=True, slots=True)

@@ -153,7 +153,7 @@ class CoupledModel:
         forces = np.zeros((len(self._ports), 2, len(self.planes)), dtype=complex)
         for plane in range(len(self.planes)):
             forces[first[plane >= discs] + plane, :, plane] = UNBALANCE_FORCE
-        return forces.reshape(-1, len(self.planes))
+        return forces.reshape(2 * len(self._ports), len(self.planes))
 
     def frequency_response(
         self, omega: FloatArray, *, speed: float, channel: str,

@@ -64,19 +64,19 @@ def answer(
         If the system is singular: an undamped resonance is hit.
 
     """
-    count, reach = len(springs), rotor.regular.shape[1]
+    count, reach = len(springs), rotor.shapes.shape[1]
     journals, loads, below = slice(0, count), loads[:reach], loads[reach:]
     housings, (moved, pushed) = standing.receptance, standing.pushed(below)
     # Through the bearings f = Z (x_journal - H f - u); what the springs in the rotor's modes have
     # not yet taken, g = f - k0 x_journal, obeys  A g = (Z - A k0) x_journal - Z u.
     a = np.eye(count) + bearings @ housings
     w = bearings - a * springs
-    free = rotor.regular @ loads
+    free = rotor.motion(loads)
     near = rotor.shapes[:, journals]
     adjoint = rotor.shapes.conj().transpose(0, 2, 1)
     size = count + near.shape[2]
     system = np.zeros((len(standing.omega), size, size), dtype=complex)
-    system[:, :count, :count] = a + w @ rotor.regular[:, journals, journals]
+    system[:, :count, :count] = a + w @ rotor.between(count // 2)
     system[:, :count, count:] = -w @ near
     system[:, count:, :count] = adjoint[:, :, journals]
     system[:, range(count, size), range(count, size)] = rotor.stiffness
@@ -87,7 +87,7 @@ def answer(
         raise NotSolvedError('the coupled system is singular: a resonance without damping is '
                              'hit') from error
     beyond, amplitude = solution[:, :count], solution[:, count:]
-    ports = free - rotor.regular[:, :, journals] @ beyond + rotor.shapes @ amplitude
+    ports = free - rotor.motion(beyond) + rotor.shapes @ amplitude
     through = beyond + springs[:, None] * ports[:, journals]
     motion = housings @ through + moved
     blocks, into_soil = standing.blocks(through, motion, below, pushed)

@@ -232,7 +232,8 @@ class _System:
         motion = np.linalg.solve(self.matrix, load[..., None])
         through, seats = (self.through @ motion)[..., 0], (self.into_seats @ motion)[..., 0]
         blocks = motion[:, self.rotor_size:, 0]
-        forces = [np.repeat(through.reshape(len(load), -1, 1, 2), 2, axis=2).reshape(len(load), -1)]
+        both = np.repeat(through.reshape(len(load), -1, 1, 2), 2, axis=2)
+        forces = [both.reshape(len(load), -1)]
         others = 2 * (len(model.rotor.discs) + len(model.rotor.probes))
         forces.append(np.full((len(load), others), complex(np.nan, np.nan)))
         for index, foundation in enumerate(model.foundations):

@@ -124,6 +124,8 @@ def add_mass(compliance: ComplexArray, mass: FloatArray, omega: FloatArray) -> C
 def carrying(compliance: ComplexArray, mass: FloatArray, omega: FloatArray) -> ComplexArray:
     """Return I - omega^2 N M, (n, d, d): what a mass makes of a compliance's motion [-]."""
     size = len(mass)
-    # One product of tall matrices instead of many small ones.
-    carried = (compliance.reshape(-1, size) @ mass).reshape(-1, size, size)
-    return np.asarray(np.eye(size) - omega[:, None, None] ** 2 * carried)
+    # One product of tall matrices instead of many small ones, and no copies.
+    carried: ComplexArray = (compliance.reshape(-1, size) @ mass).reshape(-1, size, size)
+    carried *= -(omega[:, None, None] ** 2)
+    carried[:, range(size), range(size)] += 1.0
+    return carried

@@ -1,4 +1,4 @@
-"""Which complex frequencies make rotor, bearings and support vibrate without a force?"""
+"""Complex frequencies at which rotor, bearings and support vibrate without a force."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,9 +22,6 @@ _NEAR_GUESS = 0.05
 
 # Two vectors are one from this cosine on, at frequencies equal within the steps.
 _SAME = 0.999
-
-# Guesses beyond those wanted: their order may be another than that of the modes.
-_SPARE = 6
 
 # Share of the compliance that guesses may neglect.
 _ROUGH = 1e-4
@@ -159,8 +156,8 @@ class FreeVibration:
         inverse, orbits = self._pick(slow)
         length, ports, modes = orbits.shape
         own = len(self.mass)
-        constant, poles, left, right = self.compliance.states(_ROUGH)
-        sizes = (ports, modes, own, own, len(poles), own, ports)
+        soil_states = self.compliance.states(_ROUGH)
+        sizes = (ports, modes, own, own, len(soil_states.poles), own, ports)
         ends = np.cumsum(sizes)
         force, mode, motion, load, soil, rate, gap = (
             slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
@@ -175,13 +172,13 @@ class FreeVibration:
         a[:, mode, force], a[:, modal, modal] = orbits.conj().transpose(0, 2, 1), 1.0
         a[:, mode, motion] = -a[:, mode, force] @ self.rows
         b[:, modal, modal] = inverse
-        a[:, motion, motion], a[:, motion, load] = np.eye(own), -constant
-        a[:, motion, soil] = -left
+        a[:, motion, motion], a[:, motion, load] = np.eye(own), -soil_states.constant
+        a[:, motion, soil] = -soil_states.left
         a[:, load, force] = a[:, load, gap] = -self.rows.T
         a[:, load, load] = np.eye(own)
         b[:, load, rate] = middle * (self.mass + self.rows.T @ second @ self.rows)
-        a[:, soil, load], a[:, soil, soil] = right, np.diag(poles)
-        b[:, soil, soil] = np.eye(len(poles))
+        a[:, soil, load], a[:, soil, soil] = soil_states.right, np.diag(soil_states.poles)
+        b[:, soil, soil] = np.eye(len(soil_states.poles))
         a[:, rate, rate], b[:, rate, motion] = np.eye(own), np.eye(own) / middle
         a[:, gap, force], a[:, gap, mode], a[:, gap, gap] = static, -orbits, np.eye(ports)
         a[:, gap, motion] = (np.eye(ports) - static) @ self.rows
@@ -202,7 +199,7 @@ class FreeVibration:
 
     def guesses(self, count: int) -> tuple[ComplexArray, ComplexArray]:
         """
-        Solve the linear eigenproblem for about as many modes as are wanted.
+        Solve the linear eigenproblem for as many modes as are wanted.
 
         Returns
         -------
@@ -222,7 +219,7 @@ class FreeVibration:
         values = np.where(np.abs(values) * self.highest < 1e-6, 1e-6 / self.highest, values)
         frequency = centre + 1.0 / values
         keep = vibrates(frequency) & (np.abs(frequency) < 2.0 * self.highest)
-        count = min(int(keep.sum(axis=1).max()), count + _SPARE)
+        count = min(int(keep.sum(axis=1).max()), count)
         order = np.argsort(np.where(keep, frequency.real, np.inf), axis=1)[:, :count]
         ports, modes = len(self.rows), self.resonant.shape[1]
         motion = ports + 2 * modes
@@ -238,7 +235,7 @@ class FreeVibration:
         Returns
         -------
         frequency : (n, p) complex array
-            w [rad/s], at least `count` where there are as many, NaN where there are fewer.
+            w [rad/s] of at most `count`, NaN where there are fewer.
         vector : (n, p, d) complex array
             What `matrix` sends to zero.
         sound : (n,) bool array
@@ -246,10 +243,10 @@ class FreeVibration:
 
         """
         guess, vector = self.guesses(count)
-        wanted = np.isfinite(guess)
-        frequency = np.where(wanted, guess, self.highest)
+        frequency = np.where(np.isfinite(guess), guess, self.highest)
+        wanted: BoolArray = np.isfinite(guess) & self.compliance.agrees(frequency)
         vector[~wanted] = 1.0
-        active = wanted.copy()
+        active: BoolArray = wanted.copy()
         for _ in range(_ITERATIONS):
             step, vector = self._newton(frequency, vector)
             frequency = frequency + np.where(wanted, step, 0.0)
@@ -258,8 +255,8 @@ class FreeVibration:
                 break
         moved = wanted & (np.abs(frequency - guess) > _NEAR_GUESS * np.abs(frequency))
         frequency = np.where(wanted & ~active & vibrates(frequency), frequency, np.nan)
-        sound = ~(active | moved | _repeats(frequency, vector)).any(axis=1)
-        return frequency, vector, sound
+        unsound = active | moved | _repeats(frequency, vector)
+        return frequency, vector, np.asarray(~unsound.any(axis=1))
 
     def _newton(
         self, frequency: ComplexArray, vector: ComplexArray,

@@ -1,6 +1,7 @@
-"""At which frequencies does the machine vibrate on its own, and which speeds are critical?"""
+"""The machine's own vibration over speed, and the speeds that are critical."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 import math
 
@@ -9,7 +10,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import RotorSoilError
+from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.physics.spectrum import Spectrum, SpectrumSolver
 
 # Speeds at which the search for criticals begins.
@@ -60,6 +61,16 @@ class Campbell:
         return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
 
 
+@contextmanager
+def _solvable() -> Iterator[None]:
+    """Turn what the linear algebra refuses into an error of this package."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise NotSolvedError(f'the modes of this machine cannot be computed: {error}') from error
+
+
+@_solvable()
 def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
     """
     Return the lowest modes at each speed.
@@ -146,6 +157,7 @@ class CriticalSpeed:
         return 0.17 * (1.0 - 1.0 / (factor - 1.5)) + (0.10 if self.speed > running else 0.0)
 
 
+@_solvable()
 def critical_speeds(
     model: CoupledModel, speed_range: tuple[float, float],
 ) -> tuple[CriticalSpeed, ...]:
@@ -172,7 +184,7 @@ def critical_speeds(
     solver = SpectrumSolver.up_to(model, _ABOVE * high)
     speed = np.linspace(low, high, _FIRST_SPEEDS)
     while True:
-        found = solver.solve(speed, _ALL)
+        solver, found = solver.refined(speed, _ALL)
         branch = _follow(found)
         closer = np.setdiff1d(_touching(speed, found, branch), speed)
         if not len(closer) or len(speed) > _MOST_SPEEDS:
@@ -184,7 +196,7 @@ def critical_speeds(
 
 
 def _follow(found: Spectrum) -> IntArray:
-    """Number the curves: a mode continues the one whose shape and frequency are closest."""
+    """Give a mode the number of the curve whose shape and frequency come closest."""
     exists = np.isfinite(found.frequency)
     shape = _unit(found.shape)
     branch = np.full(exists.shape, -1)
@@ -207,7 +219,7 @@ def _follow(found: Spectrum) -> IntArray:
 def _touching(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
     """Return speeds where a curve that seems to miss omega = Omega may still touch it."""
     closer = []
-    for name in range(branch.max() + 1):
+    for name in range(branch.max(initial=-1) + 1):
         row, mode = np.nonzero(branch == name)
         place, excess = speed[row], found.frequency[row, mode].real - speed[row]
         for i in range(1, len(row) - 1):
@@ -224,7 +236,7 @@ def _crossings(
     speed: FloatArray, found: Spectrum, branch: IntArray,
 ) -> Iterator[tuple[float, float, ComplexArray]]:
     """Yield two speeds between which a curve crosses omega = Omega, and its shapes there."""
-    for name in range(branch.max() + 1):
+    for name in range(branch.max(initial=-1) + 1):
         row, mode = np.nonzero(branch == name)
         above = found.frequency[row, mode].real > speed[row]
         for i in np.flatnonzero(above[:-1] != above[1:]):
@@ -240,7 +252,7 @@ def _critical(
     wanted = _unit(shapes).conj().T
 
     def likeness(found: Spectrum) -> FloatArray:
-        return np.asarray(np.nan_to_num(np.abs(_unit(found.shape[0]) @ wanted)).sum(axis=1))
+        return np.asarray(np.nansum(np.abs(_unit(found.shape[0]) @ wanted), axis=1))
 
     def mode_at(speed: float) -> tuple[Spectrum, int]:
         found = solver.solve(np.array([speed]), _ALL)

@@ -33,12 +33,16 @@ class SpeedTrack:
     angle_at_start : float or None
         Rotor angle at the first sample [rad]; None if nothing tells where the mark on the
         shaft is: phases then have no meaning.
+    angle : (m,) float array or None
+        Rotor angle at every sample [rad], whole turns left out or not: the errors of the
+        speed then do not add up over a long run.
 
     """
 
     time: FloatArray
     speed: FloatArray
     angle_at_start: float | None = None
+    angle: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if len(self.time) < 2 or len(self.time) != len(self.speed):
@@ -46,6 +50,15 @@ class SpeedTrack:
                                  f'got {len(self.time)} and {len(self.speed)}')
         if not (np.all(np.diff(self.time) > 0.0) and np.all(np.isfinite(self.speed))):
             raise RotorSoilError('a speed track needs ascending times in s and finite speeds')
+        if self.angle is not None and not (
+                len(self.angle) == len(self.time) and np.all(np.isfinite(self.angle))):
+            raise RotorSoilError('a speed track needs a finite angle in rad at every sample, or '
+                                 'none')
+
+    @property
+    def has_phase(self) -> bool:
+        """Whether the angle is counted from a mark on the shaft."""
+        return self.angle_at_start is not None or self.angle is not None
 
     def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
@@ -65,6 +78,8 @@ class SpeedTrack:
         rate = np.diff(self.speed) / step
         turned = np.cumsum(0.5 * (self.speed[:-1] + self.speed[1:]) * step)
         start = np.concatenate([[0.0], turned]) + (self.angle_at_start or 0.0)
+        if self.angle is not None:
+            start += np.angle(np.exp(1j * (self.angle - start)))
         index = np.clip(np.searchsorted(self.time, time, side='right') - 1, 0, len(step) - 1)
         since = time - self.time[index]
         angle = start[index] + (self.speed[index] + 0.5 * rate[index] * since) * since
@@ -161,7 +176,7 @@ def demodulate(
     spread = np.diagonal(covariance)[:-1].reshape(-1, 4)[:, :2].max(axis=1)
     return OrderVector(
         middle, float(track.at(np.array([middle]))[1][0]), vectors[:, 0] + 1j * vectors[:, 1],
-        np.sqrt(variance * spread), track.angle_at_start is not None)
+        np.sqrt(variance * spread), track.has_phase)
 
 
 def order_vectors(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rotorsoil_ros.physics.arrays import BoolArray, FloatArray
 
@@ -17,6 +18,10 @@ _APPROACH = 3.0
 # Afterwards the free vibration decays as exp(-p tau) while the forced one falls as 1 / tau:
 # at tau = 5 / p it is down to a twentieth of it.
 _DECAY = 5.0
+
+# Up to where behind the resonance a passage moves the peak, without damping, in units of the
+# square root of the rate: Lewis' limit.
+LARGEST_SHIFT = 2.16
 
 # Samples over which a slope is fitted: speeds out of single turns scatter.
 _SLOPE_SAMPLES = 15
@@ -48,7 +53,14 @@ def speed_rate(time: FloatArray, speed: FloatArray) -> FloatArray:
     """Return the rate of speed [rad/s^2] at each sample, a slope fitted over its neighbours."""
     rates = np.zeros_like(speed)
     half = _SLOPE_SAMPLES // 2
-    for index in range(len(time)):
+    inner = np.arange(half, max(half, len(time) - half))
+    if len(inner):
+        since = sliding_window_view(time, _SLOPE_SAMPLES)
+        since = since - since.mean(axis=1, keepdims=True)
+        spread = np.sum(since**2, axis=1)
+        slope = np.sum(since * sliding_window_view(speed, _SLOPE_SAMPLES), axis=1)
+        np.divide(slope, spread, out=rates[inner[0]:inner[-1] + 1], where=spread > 0.0)
+    for index in np.setdiff1d(np.arange(len(time)), inner):
         near = slice(max(0, index - half), index + half + 1)
         since = time[near] - time[near].mean()
         spread = since @ since

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.csgraph import connected_components
 
-from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 # A fit ends when every sample is met this well, relative to the diagonal of its matrix ...
 _TOLERANCE = 1e-12
@@ -21,6 +21,9 @@ _ROUGH = 1e-4
 
 # Fits worse than this are corrected by what they miss at the real frequency of a vibration.
 _EXACT = 1e-9
+
+# Two fits that differ less, relative to the largest entry, say the same.
+_AGREED = 1e-2
 
 # Entries that stay below this share of their diagonal are round-off.
 _UNCOUPLED = 1e-10
@@ -43,6 +46,8 @@ class Continuation:
         What does not couple is fitted by itself, so that no part has poles of another.
     size : (d,) float array
         Typical square root of the diagonal, which makes the entries comparable.
+    others : tuple of (indices, RationalMatrix)
+        The same from every other sample.
     known : callable or None
         The function at real frequencies (n,), where the fit is too rough; else None.
     span : tuple of two floats
@@ -51,6 +56,7 @@ class Continuation:
     """
 
     parts: tuple[tuple[IntArray, 'RationalMatrix'], ...]
+    others: tuple[tuple[IntArray, 'RationalMatrix'], ...]
     size: FloatArray
     known: Callable[[FloatArray], ComplexArray] | None
     span: tuple[float, float]
@@ -71,63 +77,81 @@ class Continuation:
 
         """
         values = known(omega)
-        size = np.sqrt(np.abs(values.diagonal(axis1=1, axis2=2)).max(axis=0, initial=0.0))
-        size[size == 0.0] = 1.0
+        largest = np.abs(values.diagonal(axis1=1, axis2=2)).max(axis=0, initial=0.0)
+        size: FloatArray = np.sqrt(np.where(largest > 0.0, largest, 1.0))
         values = values / (size[:, None] * size)
         couples = np.abs(values).max(axis=0, initial=0.0) > _UNCOUPLED
         _, labels = connected_components(couples, directed=False)
-        parts = []
-        for label in np.unique(labels):
-            index = np.flatnonzero(labels == label)
-            parts.append((index, RationalMatrix.of(omega, values[:, index[:, None], index])))
-        fit = cls(tuple(parts), size, None, (float(omega[0]), float(omega[-1])))
+        groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+        parts, others = (
+            tuple((index, RationalMatrix.of(
+                omega[::step], values[::step, index[:, None], index])) for index in groups)
+            for step in (1, 2))
+        fit = cls(parts, others, size, None, (float(omega[0]), float(omega[-1])))
         rough = np.abs(fit(omega.astype(complex)) - values).max(initial=0.0) > _EXACT
         return replace(fit, known=known) if rough else fit
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:
         """Return the function over its size at complex frequencies, (..., d, d)."""
-        values = self._fitted(omega)
+        values = self._fitted(self.parts, omega)
         if self.known is not None:
-            real = np.clip(omega.real, *self.span)
+            real = np.asarray(np.clip(omega.real, *self.span), dtype=float)
             exact = self.known(real.ravel()) / (self.size[:, None] * self.size)
-            values += exact.reshape(values.shape) - self._fitted(real.astype(complex))
+            values += exact.reshape(values.shape)
+            values -= self._fitted(self.parts, real.astype(complex))
         return values
 
-    def _fitted(self, omega: ComplexArray) -> ComplexArray:
+    def agrees(self, omega: ComplexArray) -> BoolArray:
+        """
+        Return whether the samples determine the function at complex frequencies.
+
+        Far from the real axis, and near the cut of a function that is not rational, fits to
+        different samples differ: what only one of them says is not known.
+        """
+        one, other = (self._fitted(parts, omega) for parts in (self.parts, self.others))
+        gap, size = (np.abs(values).max(axis=(-2, -1), initial=0.0)
+                     for values in (one - other, one))
+        return np.asarray(gap <= _AGREED * size)
+
+    def _fitted(
+        self, parts: tuple[tuple[IntArray, 'RationalMatrix'], ...], omega: ComplexArray,
+    ) -> ComplexArray:
         count = len(self.size)
         values = np.zeros((*omega.shape, count, count), dtype=complex)
-        for index, part in self.parts:
+        for index, part in parts:
             values[..., index[:, None], index] = part(omega)
         return values
 
-    def states(self, tolerance: float) -> tuple[ComplexArray, ComplexArray, ComplexArray,
-                                                ComplexArray]:
-        """
-        Return the function over its size as constant + left (omega - poles)^-1 right.
-
-        Parameters
-        ----------
-        tolerance : float
-            Relative size below which a term is left out.
-
-        Returns
-        -------
-        constant (d, d), poles (s,), left (d, s), right (s, d) : complex arrays
-
-        """
+    def states(self, tolerance: float) -> 'States':
+        """Return the function over its size by its poles, small terms left out."""
         count = len(self.size)
-        constant = np.zeros((count, count), dtype=complex)
-        terms = []
+        total = States(np.zeros((count, count), dtype=complex), np.zeros(0, dtype=complex),
+                       np.zeros((count, 0), dtype=complex), np.zeros((0, count), dtype=complex))
         for index, part in self.parts:
-            steady, poles, left, right = part.states(tolerance)
-            constant[index[:, None], index] = steady
-            place = np.eye(count)[:, index]
-            terms.append((poles, place @ left, right @ place.T))
-        if not terms:
-            return constant, *(np.zeros(shape, dtype=complex)
-                               for shape in (0, (count, 0), (0, count)))
-        poles, left, right = zip(*terms, strict=True)
-        return constant, np.concatenate(poles), np.hstack(left), np.vstack(right)
+            own, place = part.states(tolerance), np.eye(count)[:, index]
+            total = States(total.constant + place @ own.constant @ place.T,
+                           np.concatenate([total.poles, own.poles]),
+                           np.concatenate([total.left, place @ own.left], axis=1),
+                           np.concatenate([total.right, own.right @ place.T]))
+        return total
+
+
+@dataclass(frozen=True, slots=True)
+class States:
+    """
+    Matrix function constant + left (omega - poles)^-1 right.
+
+    Attributes
+    ----------
+    constant, poles, left, right : (d, d), (s,), (d, s), (s, d) complex arrays
+        Of s first-order states.
+
+    """
+
+    constant: ComplexArray
+    poles: ComplexArray
+    left: ComplexArray
+    right: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -179,7 +203,12 @@ class RationalMatrix:
         least = min(worst for worst, _ in fits)
         enough = _TOLERANCE if least <= _TOLERANCE else max(_ROUGH, 10.0 * least)
         count = next(i for i, (worst, _) in enumerate(fits, 1) if worst <= enough)
-        return cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
+        while True:
+            fit = cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
+            # What no ground does: growing on its own. The fit has followed the errors.
+            if count == 1 or not np.any(fit.states(_ROUGH).poles.imag < 0.0):
+                return fit
+            count -= 1
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:
         """Return the function at real or complex frequencies, (..., d, d)."""
@@ -189,9 +218,8 @@ class RationalMatrix:
         values /= cauchy.sum(axis=-1)[..., None]
         return np.asarray(values.reshape(*omega.shape, *self.values.shape[1:]))
 
-    def states(self, tolerance: float) -> tuple[ComplexArray, ComplexArray, ComplexArray,
-                                                ComplexArray]:
-        """Return the function as constant + left (omega - poles)^-1 right."""
+    def states(self, tolerance: float) -> States:
+        """Return the function by its poles, terms below the tolerance left out."""
         count, size, _ = self.values.shape
         arrow = np.zeros((count + 1, count + 1), dtype=complex)
         arrow[0, 1:], arrow[1:, 0] = self.weights, 1.0
@@ -205,8 +233,8 @@ class RationalMatrix:
         reach = np.abs(poles[:, None] - self.nodes).min(axis=1, initial=np.inf)
         pole, term = np.nonzero(terms > tolerance * reach[:, None])
         constant = (self.weights @ flat / self.weights.sum()).reshape(size, size)
-        return (constant, poles[pole], left[pole, :, term].T * terms[pole, term],
-                right[pole, term])
+        return States(constant, poles[pole], left[pole, :, term].T * terms[pole, term],
+                      right[pole, term])
 
 
 def _is_enough(errors: list[float]) -> bool:

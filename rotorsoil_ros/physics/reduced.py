@@ -1,4 +1,4 @@
-"""Which few shapes carry the shaft, at rest and turning?"""
+"""The few shapes that carry the shaft, at rest and turning."""
 
 from dataclasses import dataclass
 

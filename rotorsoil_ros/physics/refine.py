@@ -8,12 +8,16 @@ from itertools import pairwise
 import numpy as np
 
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.errors import NotSolvedError
 
 DEGREE = 7
 
 # Relative to the highest speed: a piece this short around a pole is given up. A double resolves
 # 1e-16, so that an interpolant still has seven digits there.
 _SHORTEST = 1e-9
+
+# Open pieces at one time: ten resonances of a case need some hundred.
+_MOST_OPEN = 4096
 
 # Probing columns need only betray a resonance, and only while a piece is long enough to hide it.
 _PROBE_TOLERANCE = 1e-2
@@ -88,23 +92,18 @@ def evaluate(
     np.multiply(place, place, out=powers[0])
     powers[1:] = ((place - left) - (right - place)) / (right - left)
     np.multiply.accumulate(powers, axis=0, out=powers)
-    if len(place) == 1:  # the live node: no sorting, few calls
-        terms: FloatArray = powers * coefficients[index[0]]
-        return np.asarray(terms.sum(axis=0, keepdims=True))
+    if len(place) == 1:  # the live node: nothing to sort
+        return _sum(powers, coefficients[index[0]])
     values = np.empty((len(place), coefficients.shape[2]))
     for piece, run in _runs(index):
-        values[run] = _sum(powers[:, run, None], coefficients[piece])
+        values[run] = _sum(powers[:, run], coefficients[piece])
     return values
 
 
 def _sum(powers: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return the sum of powers (d, n, 1) times rows (d, w), (n, w)."""
-    total: FloatArray = powers[0] * rows[0]
-    term = np.empty_like(total)
-    for power, row in zip(powers[1:], rows[1:], strict=True):
-        np.multiply(power, row, out=term)
-        total += term
-    return total
+    """Return the sum of powers (d, n) times rows (d, w), (n, w)."""
+    # Not a matrix product: einsum adds term after term for each element, whatever n is.
+    return np.asarray(np.einsum('dn,dw->nw', powers, rows))
 
 
 def _runs(index: IntArray) -> Iterator[tuple[int, IntArray]]:
@@ -141,6 +140,11 @@ def refine(
     Pieces
         Of the wanted values.
 
+    Raises
+    ------
+    NotSolvedError
+        If round-off or noise would be refined without end.
+
     """
     # Every other point of a finer Chebyshev-Lobatto grid carries the polynomial, the rest tests.
     along = -np.cos(np.pi * np.arange(2 * DEGREE + 1) / (2 * DEGREE))
@@ -149,6 +153,10 @@ def refine(
     left, right, high = edges[:-1], edges[1:], edges[-1]
     done: list[tuple[FloatArray, FloatArray, BoolArray, ComplexArray]] = []
     while len(left):
+        if len(left) > _MOST_OPEN:
+            raise NotSolvedError(f'the response is rough everywhere: {len(left)} pieces between '
+                                 f'{left.min():g} and {right.max():g} rad/s still miss their '
+                                 'tolerance')
         middle, half = 0.5 * (left + right), 0.5 * (right - left)
         wanted, probing = (values.reshape(len(left), len(along), *values.shape[1:])
                            for values in solve((middle[:, None] + half[:, None] * along).ravel()))

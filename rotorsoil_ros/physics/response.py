@@ -21,7 +21,7 @@ TOLERANCE = 1e-5
 _FIRST_PIECES = 32
 
 # Samples evaluated together: many share a piece, and they stay in the processor's cache.
-_BLOCK = 8192
+_BLOCK = 16384
 
 # Unseen speeds at which a finished table is compared with the exact solution.
 _CHECKS = 200
@@ -90,8 +90,8 @@ class ResponseTable:
         forces = model.plane_forces
         # Unbalance turns forward only. Forces along x and along z alone also see the backward
         # resonances, of which unbalance may show a narrow trace.
-        single = [np.where(np.abs(forces.reshape(-1, 2, planes)) > 0.0, axis, 0.0).reshape(
-            -1, planes) for axis in (np.array([[[1.0], [0.0]]]), np.array([[[0.0], [1.0]]]))]
+        single = [np.where(np.abs(forces.reshape(len(forces) // 2, 2, planes)) > 0.0, axis, 0.0).reshape(
+            forces.shape) for axis in (np.array([[[1.0], [0.0]]]), np.array([[[0.0], [1.0]]]))]
         loads = np.concatenate([forces, *single], axis=1)
 
         def solve(speed: FloatArray) -> tuple[ComplexArray, ComplexArray]:

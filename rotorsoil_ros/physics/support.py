@@ -89,7 +89,6 @@ class Support:
 
     def standing(self, omega: FloatArray) -> 'Standing':
         """Return how the support answers forces at frequencies (n,) [rad/s]."""
-        count = 2 * len(self.bearings)
         compliances = [model.compliance(omega) for model in self.soil_models]
         inertias = [carrying(compliance, foundation.mass_matrix, omega) for compliance, foundation
                     in zip(compliances, self.foundations, strict=True)]
@@ -99,10 +98,7 @@ class Support:
         deflection = self.pedestals(omega)
         for rows, motion in zip(self.seat_rows, per_force, strict=True):
             deflection += rows @ motion
-        held_back = carrying(deflection, self.housing_mass, omega)
-        return Standing(
-            self, omega, compliances, inertias, per_force, deflection, held_back,
-            np.linalg.solve(held_back, deflection) if self.pedestal_axes else deflection)
+        return Standing(self, omega, compliances, inertias, per_force, deflection)
 
     @cached_property
     def motion_rows(self) -> FloatArray:
@@ -151,12 +147,8 @@ class Standing:
         N of each block [m/N], and I - omega^2 N M, what its mass makes of it [-].
     per_force : list of (n, 6, 2 b) complex arrays
         Motion of each block per force on a seat.
-    deflection, inertia : (n, 2 b, 2 b) complex arrays
-        Motion of the housings per force into their pedestals [m/N], and what their own mass
-        makes of it [-].
-    receptance : (n, 2 b, 2 b) complex array
-        Motion of the housings over (x, z) of each per force on them [m/N]: a pedestal is a
-        compliance in series with that of its seat, and it carries the housing.
+    deflection : (n, 2 b, 2 b) complex array
+        Motion of the housings per force into their pedestals [m/N].
 
     """
 
@@ -166,8 +158,22 @@ class Standing:
     inertias: list[ComplexArray]
     per_force: list[ComplexArray]
     deflection: ComplexArray
-    inertia: ComplexArray
-    receptance: ComplexArray
+
+    @cached_property
+    def receptance(self) -> ComplexArray:
+        """
+        Motion of the housings over (x, z) of each per force on them, (n, 2 b, 2 b) [m/N].
+
+        A pedestal is a compliance in series with that of its seat, and carries the housing.
+        """
+        return self._carried(self.deflection)
+
+    def _carried(self, motion: ComplexArray) -> ComplexArray:
+        """Return what the mass of the housings makes of their motion, (n, 2 b, k)."""
+        mass = self.support.housing_mass
+        if not mass.any():  # the usual case, at no cost
+            return motion
+        return np.linalg.solve(carrying(self.deflection, mass, self.omega), motion)
 
     def pushed(self, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """
@@ -194,7 +200,7 @@ class Standing:
         seats = np.zeros((len(self.omega), count, loads.shape[1]), dtype=complex)
         for rows, motion in zip(self.support.seat_rows, blocks, strict=True):
             seats += rows @ motion
-        return (np.linalg.solve(self.inertia, seats + self.deflection @ on_housings),
+        return (self._carried(seats + self.deflection @ on_housings),
                 np.concatenate([seats[:, :0], *blocks], axis=1))
 
     def blocks(

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg
 
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray
+from rotorsoil_ros.physics.errors import NotSolvedError
 from rotorsoil_ros.physics.rotor import Rotor
 
 # A mode whose dynamic stiffness fell below this share of its static one is kept out of the sum
@@ -71,7 +72,7 @@ class WhirlModes:
 
         """
         stiffness, mass, polar = held(rotor, springs)
-        pairs = [scipy.linalg.eigh(mass + direction / order * polar, stiffness)
+        pairs = [_modes(mass + direction / order * polar, stiffness)
                  for direction in (-1.0, 1.0)]
         return cls(np.array([values for values, _ in pairs]),
                    np.array([shapes[ports] for _, shapes in pairs]), 2)
@@ -82,7 +83,7 @@ class WhirlModes:
     ) -> 'WhirlModes':
         """Solve for the modes at fixed speed [rad/s]; parameters as in `of`."""
         stiffness, mass, polar = held(rotor, springs)
-        squares, rest = scipy.linalg.eigh(mass, stiffness)
+        squares, rest = _modes(mass, stiffness)
         inverse, vectors = np.linalg.eigh(
             spinning(np.maximum(squares, 0.0), rest.T @ polar @ rest, np.array([speed])))
         shapes = rest[ports] @ vectors[0, :len(rest)]
@@ -110,19 +111,13 @@ class WhirlModes:
         np.put_along_axis(gain, nearest, 0.0, axis=1)
         shapes = self.shapes[directions, :, indices]
         powers = (argument / scale)[:, None] ** np.arange(_TERMS)
-        forward, backward = (
+        receptances = np.stack([
             powers @ self._series(direction, ~close[direction], scale)
             + gain[:, directions == direction] @ _squares(shapes[directions == direction])
-            for direction in (0, 1))
-
-        length, ports = len(omega), self.shapes.shape[1]
-        between = np.empty((length, ports, 2, ports, 2), dtype=complex)
-        one, other = (part.reshape(length, ports, ports)
-                      for part in (0.5 * (forward + backward), 0.5 * (forward - backward)))
-        between[:, :, 0, :, 0] = between[:, :, 1, :, 1] = one
-        between[:, :, 0, :, 1], between[:, :, 1, :, 0] = -1j * other, 1j * other
+            for direction in (0, 1)])
+        ports = self.shapes.shape[1]
         whirls = (shapes[:, :, None] * ORBITS[directions, None]).reshape(-1, 2 * ports)
-        return PortReceptance(between.reshape(length, 2 * ports, 2 * ports),
+        return PortReceptance(receptances.reshape(2, len(omega), ports, ports),
                               whirls[nearest].transpose(0, 2, 1),
                               np.take_along_axis(stiffness, nearest, axis=1))
 
@@ -131,6 +126,16 @@ class WhirlModes:
         ratio = scale * self.inverse[direction, far]
         return np.asarray(
             ratio ** np.arange(_TERMS)[:, None] @ _squares(self.shapes[direction][:, far].T))
+
+
+def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return 1 / omega^2 and the shapes of all modes, of unit strain energy."""
+    try:
+        inverse, shapes = scipy.linalg.eigh(mass, stiffness)
+    except scipy.linalg.LinAlgError as error:
+        raise NotSolvedError('the shaft on its bearings is not stiff in every direction: its '
+                             'modes cannot be found') from error
+    return inverse, shapes
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,18 +148,54 @@ class PortReceptance:
 
     Attributes
     ----------
-    regular : (n, 2 p, 2 p) complex array
-        Receptance of all other modes over (x, z) of each port [m/N].
+    regular : (2, n, p, p) float array
+        Receptance of all other modes in forward and in backward whirl [m/N].
     shapes : (n, 2 p, k) complex array
-        Shapes of the k modes kept apart.
+        Shapes of the k modes kept apart, over (x, z) of each port.
     stiffness : (n, k) float array
         Their dynamic stiffness, 1 - omega^2 / omega_k^2; it may be zero.
 
     """
 
-    regular: ComplexArray
+    regular: FloatArray
     shapes: ComplexArray
     stiffness: FloatArray
+
+    def motion(self, forces: ComplexArray) -> ComplexArray:
+        """
+        Return the motion of all ports by the regular part.
+
+        Parameters
+        ----------
+        forces : (n, 2 q, k) or (2 q, k) complex array
+            Over (x, z) of the first q ports [N].
+
+        Returns
+        -------
+        (n, 2 p, k) complex array
+            Over (x, z) of each port [m].
+
+        """
+        _, length, ports, _ = self.regular.shape
+        count, columns = forces.shape[-2] // 2, forces.shape[-1]
+        x, z = forces[..., 0::2, :], forces[..., 1::2, :]
+        whirls = np.stack([orbit[0].conj() * x + orbit[1].conj() * z for orbit in ORBITS])
+        # One set of forces for all frequencies, or one for each.
+        sets = forces.shape[0] if forces.ndim == 3 else 1
+        answers = self.regular[..., :count] @ whirls.reshape(2, sets, count, columns)
+        motion = np.empty((length, ports, 2, columns), dtype=complex)
+        for axis in (0, 1):
+            motion[:, :, axis] = ORBITS[0, axis] * answers[0] + ORBITS[1, axis] * answers[1]
+        return motion.reshape(length, 2 * ports, columns)
+
+    def between(self, count: int) -> ComplexArray:
+        """Return the regular receptance between the first ports, (n, 2 q, 2 q)."""
+        forward, backward = self.regular[..., :count, :count]
+        total = np.empty((len(forward), count, 2, count, 2), dtype=complex)
+        total[:, :, 0, :, 0] = total[:, :, 1, :, 1] = 0.5 * (forward + backward)
+        total[:, :, 0, :, 1] = -0.5j * (forward - backward)
+        total[:, :, 1, :, 0] = 0.5j * (forward - backward)
+        return total.reshape(-1, 2 * count, 2 * count)
 
 
 def _squares(shapes: FloatArray) -> FloatArray:

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rotorsoil_ros.physics.bearing import Pedestal, SpeedTable
 from rotorsoil_ros.physics.cone import ConeModel
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.rotor import Bearing, Disc, Material, Rotor, ShaftSection
+from rotorsoil_ros.physics.rotor import Bearing, Disc, Material, Probe, Rotor, ShaftSection
 from rotorsoil_ros.physics.soil import DOFS, Rectangle, Soil
 
 SHARED = Path(__file__).resolve().parents[2].parent / 'shared'
@@ -64,3 +65,48 @@ class Restrained:
     def compliance(self, omega):
         """Return the compliance with zero rows for what is held."""
         return self.model.compliance(omega) * self.free[:, None] * self.free
+
+
+class Springs:
+    """A soil of springs and dashpots, whose modes a linear eigenproblem has."""
+
+    def __init__(self, stiffness, damping):
+        self.stiffness = np.array(stiffness)
+        self.damping = np.array(damping)
+
+    def compliance(self, omega):
+        """Return (K + i omega C)^-1."""
+        omega = np.asarray(omega)[:, None, None]
+        return np.linalg.inv(self.stiffness + 1j * omega * self.damping)
+
+
+def elastic_machine(soils=None):
+    """Return two blocks, two of three bearings on pedestals, one of them a table over speed."""
+    stiffness = np.array([[2e8, 5e7], [-5e7, 1e8]])
+    damping = np.array([[4e4, 1e3], [-1e3, 2e4]])
+    growth = np.linspace(0.5, 1.5, 6)[:, None, None]
+    speeds = np.linspace(0.0, 1000.0, 6)
+    skew = Pedestal(np.array([[40.0, 5.0], [5.0, 60.0]]), np.array([[3e8, 2e7], [1e7, 5e8]]),
+                    np.array([[2e4, 0.0], [3e3, 3e4]]))
+    plain = Pedestal(30.0 * np.eye(2), 4e8 * np.eye(2), 1e4 * np.eye(2))
+    rotor = Rotor(
+        0.9, (ShaftSection(2.0, (0.08, 0.10), (0.0, 0.02), 10, STEEL),),
+        (Disc('wheel', 0.8, 60.0, 1.5, 2.9), Disc('coupling', 2.0, 12.0, 0.1, 0.2)),
+        (Bearing('one', 0.1, 'left', stiffness, damping, skew),
+         Bearing('two', 1.4, 'right', SpeedTable(speeds, 0.75 * stiffness * growth),
+                 SpeedTable(speeds, damping / growth)),
+         Bearing('three', 1.9, 'right', 3e8 * np.eye(2), 1e4 * np.eye(2), plain)),
+        (Probe('probe', 0.55),))
+    blocks = (Foundation('left', Rectangle(0.5, 0.4), 0.1, 900.0, 0.3, (60.0, 70.0, 80.0)),
+              Foundation('right', Rectangle(0.5, 0.6), 1.6, 1500.0, 0.35, (90.0, 95.0, 120.0)))
+    if soils is None:
+        soils = tuple(ConeModel(SOIL, block.contact) for block in blocks)
+    return CoupledModel(rotor, blocks, soils, couples=('coupling',))
+
+
+def springy_soils():
+    """Return two soils of springs and dashpots, sliding and rocking coupled."""
+    stiffness = np.diag([2e8, 1.8e8, 2.6e8, 6e7, 7e7, 9e7])
+    stiffness[0, 4] = stiffness[4, 0] = 2e7
+    damping = np.diag([4e5, 4e5, 9e5, 3e4, 5e4, 4e4])
+    return Springs(stiffness, damping), Springs(1.3 * stiffness, 0.7 * damping)

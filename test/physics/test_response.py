@@ -1,12 +1,13 @@
 """The response table against the exact solution at speeds it has not seen."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
 from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.physics.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.physics.response import ResponseTable
 from rotorsoil_ros.physics.rotor import Disc
 from rotorsoil_ros.physics.soil import RigidSoil
@@ -156,3 +157,17 @@ def test_unbalance_that_does_not_fit_is_refused(table, unbalance):
 def test_impossible_speed_range_is_refused(machine, low, high):
     with pytest.raises(RotorSoilError, match='speed range must be 0 <= low < high in rad/s'):
         ResponseTable.build(machine, (low, high))
+
+
+def test_rotor_without_discs_answers_nothing_to_no_unbalance():
+    base = paper_machine()
+    model = CoupledModel(dataclasses.replace(base.rotor, discs=()), base.foundations,
+                         base.soil_models)
+    found = ResponseTable.build(model, RANGE).predictor(np.zeros(0)).predict(np.array([100.0]))
+    assert found.displacement.shape == (1, 14)
+    assert not found.displacement.any()
+
+
+def test_response_that_is_nothing_but_round_off_is_refused_in_finite_time():
+    with pytest.raises(NotSolvedError, match='rough everywhere'):
+        ResponseTable.build(paper_machine(stiffness=1e18), RANGE)

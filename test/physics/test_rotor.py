@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 import scipy.linalg
 
-from rotorsoil_ros.physics import beam
 from rotorsoil_ros.physics.beam import shear_coefficient
 from rotorsoil_ros.physics.dense import rotor_matrices
 from rotorsoil_ros.physics.errors import RotorSoilError
@@ -53,12 +53,6 @@ def hollow_disc(name, position, *, inner, outer, width, density):
     mass = density * math.pi / 4.0 * (outer**2 - inner**2) * width
     polar = mass * (outer**2 + inner**2) / 8.0
     return Disc(name, position, mass, polar / 2.0 + mass * width**2 / 12.0, polar)
-
-
-@pytest.fixture
-def no_shear(monkeypatch):
-    """Make shafts stiff in shear, as Euler, Bernoulli and Rayleigh have them."""
-    monkeypatch.setattr(beam, 'shear_coefficient', lambda nu, ratio: np.full_like(nu, 1e9))
 
 
 def pinned_shaft(given, spring=1e13):
@@ -180,12 +174,12 @@ def test_rigid_motion_of_a_conical_shaft_has_the_inertia_of_its_volume():
     area = math.pi / 4.0 * (outer**2 - inner**2)
     moment = math.pi / 64.0 * (outer**4 - inner**4)
     per_length = STEEL.density * area + 5.0
-    total = np.trapezoid(per_length, fine)
+    total = trapezoid(per_length, fine)
     assert rotor.mass == pytest.approx(total, rel=1e-8)  # trapezoidal rule
     assert tilt @ mass @ tilt == pytest.approx(
-        np.trapezoid(per_length * fine**2 + STEEL.density * moment, fine), rel=1e-8)
+        trapezoid(per_length * fine**2 + STEEL.density * moment, fine), rel=1e-8)
     assert tilt @ polar @ tilt == pytest.approx(
-        np.trapezoid(2.0 * STEEL.density * moment, fine), rel=1e-8)
+        trapezoid(2.0 * STEEL.density * moment, fine), rel=1e-8)
 
 
 def test_stations_become_nodes_and_even_divisions_stay():
@@ -212,7 +206,8 @@ def test_gyroscopic_matrix_is_skew_and_turns_z_into_x():
     (lambda: Disc('d', 0.0, math.nan, 0.0, 0.0), 'mass must be >= 0 kg and finite, got nan'),
     (lambda: Bearing('b', 0.0, None, np.zeros((2, 2)), np.zeros((2, 2))), 'must not both be zero'),
     (lambda: uniform_rotor(length=1.0, diameter=0.1, elements=2, material=STEEL,
-                           bearings=[bearing('a', 0.0, stiffness=1.0), bearing('b', 1.5, stiffness=1.0)]),
+                           bearings=[bearing('a', 0.0, stiffness=1.0),
+                                     bearing('b', 1.5, stiffness=1.0)]),
      'position of b must be on the shaft, 0 to 1 m, got 1.5')])
 def test_impossible_rotor_is_refused(make, rule):
     with pytest.raises(RotorSoilError, match=rule):

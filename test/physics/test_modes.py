@@ -1,0 +1,413 @@
+"""Modes and critical speeds against closed forms, full eigenproblems and published rotors."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.physics import spectrum
+from rotorsoil_ros.physics.compliance_table import ComplianceTable
+from rotorsoil_ros.physics.cone import ConeModel
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.dense import dense_eigenvalues, rotor_matrices
+from rotorsoil_ros.physics.errors import RotorSoilError
+from rotorsoil_ros.physics.foundation import Foundation
+from rotorsoil_ros.physics.modes import campbell, critical_speeds
+from rotorsoil_ros.physics.rotor import Bearing, Disc, Material, Probe, Rotor, ShaftSection
+from rotorsoil_ros.physics.soil import RigidSoil, Soil
+
+from machines import (
+    bearing,
+    CONE,
+    CONTACT,
+    elastic_machine,
+    LENGTH,
+    paper_machine,
+    Restrained,
+    springy_soils,
+    STEEL,
+    uniform_rotor,
+)
+from test_coupled import two_blocks
+from test_rotor import friswell, lalanne_ferraris, published
+
+SPEEDS = np.array([0.0, 310.0, 900.0])
+
+
+def all_of(model, speed, soils=()):
+    """Return the eigenvalues of the full matrices, those that vibrate, rising with frequency."""
+    size = len(model.support.motion_mass)
+    stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
+    blocks = 6 * len(soils)
+    for index, soil in enumerate(soils):
+        part = slice(6 * index, 6 * index + 6)
+        stiffness[part, part], damping[part, part] = soil.stiffness, soil.damping
+    pedestals = [one.pedestal for one in model.rotor.bearings if one.pedestal]
+    for index, pedestal in enumerate(pedestals):
+        part = slice(blocks + 2 * index, blocks + 2 * index + 2)
+        stiffness[part, part], damping[part, part] = pedestal.stiffness, pedestal.damping
+    values = dense_eigenvalues(model, speed, stiffness=stiffness, damping=damping)
+    return values[values.imag > 0.2 * np.abs(values)]
+
+
+def jeffcott_on_block(soil_model, *, mass=42.0, block=900.0):
+    """Return a disc on a massless shaft on a block, and the stiffness from disc to block."""
+    section = ShaftSection(1.2, (0.05, 0.05), (0.0, 0.0), 2, Material(2.1e11, 0.3, 0.0))
+    bearings = tuple(bearing(name, place, stiffness=1e8, damping=2e3)
+                     for name, place in (('a', 0.0), ('b', 1.2)))
+    rotor = Rotor(0.0, (section,), (Disc('disc', 0.6, mass, 0.0, 0.0),), bearings)
+    foundation = Foundation('block', CONTACT, 0.6, block, 0.0, (1.0, 1.0, 1.0))
+    model = CoupledModel(rotor, (foundation,), (soil_model,))
+    held = CoupledModel(Rotor(0.0, (section,), rotor.discs, tuple(
+        bearing(one.name, one.position, stiffness=1e15, foundation=None) for one in bearings)))
+    bent = held.frequency_response(np.zeros(1), speed=0.0, channel='disc_z')
+    return model, 1.0 / bent.displacement[0, held.channels.index('disc_z')].real
+
+
+@pytest.mark.parametrize('loss_factor', [0.0, 0.10])
+def test_disc_on_a_block_on_a_cone_has_the_roots_of_its_polynomial(loss_factor):
+    # S(lambda / i) = k + lambda c with complex k and c: the soil at the decaying frequency.
+    soil = Soil(48e6, 0.25, 1900.0, loss_factor)
+    cone = ConeModel(soil, CONTACT)
+    model, shaft = jeffcott_on_block(Restrained(cone, 'z'))
+    vertical = cone.cones[2]
+    spring = complex(vertical.translational_stiffness(np.zeros(1))[0])
+    dashpot = complex(vertical.translational_stiffness(np.ones(1))[0] - spring) / 1j
+    lam = np.polynomial.Polynomial([0.0, 1.0])
+    bearings = 2.0 * (1e8 + 2e3 * lam)
+    below = spring + dashpot * lam + 900.0 * lam**2
+    chain = shaft * bearings  # over (shaft + bearings): shaft and bearings in series
+    roots = ((42.0 * lam**2) * ((shaft + bearings) * below + chain) + chain * below).roots()
+    expected = roots[roots.imag > 0.2 * np.abs(roots)]
+    found = campbell(model, np.zeros(1), 6)
+    along_x = chain * np.polynomial.Polynomial([1.0]) + 42.0 * lam**2 * (shaft + bearings)
+    expected = np.concatenate([expected, [root for root in along_x.roots() if root.imag > 10.0]])
+    expected = expected[np.argsort(expected.imag)]
+    got = found.eigenvalue[0][np.isfinite(found.eigenvalue[0])]
+    np.testing.assert_allclose(got, expected, rtol=1e-7)  # 1e15 N/m of the held shaft
+    assert 0.2 < found.damping_ratio[0, np.abs(got).argmax()] < 0.9
+
+
+def test_heavily_damped_blocks_are_found_each_once():
+    soils = springy_soils()
+    model = elastic_machine(soils)
+    found = campbell(model, SPEEDS, 20)
+    for index, speed in enumerate(SPEEDS):
+        expected = all_of(model, speed, soils)[:20]
+        np.testing.assert_allclose(found.eigenvalue[index], expected, rtol=1e-7)  # of the dense
+    damped = (found.damping_ratio > 0.2) & (found.damping_ratio < 0.6)
+    assert damped.sum(axis=1).min() >= 5
+
+
+def test_overdamped_modes_have_no_frequency_and_are_left_out():
+    soils = tuple(type(soil)(soil.stiffness, 4.0 * soil.damping) for soil in springy_soils())
+    model = elastic_machine(soils)
+    found = campbell(model, SPEEDS[1:2], 14)
+    np.testing.assert_allclose(found.eigenvalue[0], all_of(model, SPEEDS[1], soils)[:14],
+                               rtol=1e-7)
+    assert found.damping_ratio.max() < 0.98
+
+
+def determinant(model, frequency):
+    """Return the determinant of the assembled machine on cones at w = lambda / i, scaled."""
+    rotor, support = model.rotor, model.support
+    stiffness, mass, gyroscopic = rotor_matrices(rotor)
+    size, speed = len(stiffness), 500.0
+    journals = np.zeros((2 * len(rotor.bearings), size))
+    for index, one in enumerate(rotor.bearings):
+        for axis in range(2):
+            journals[2 * index + axis, 4 * rotor.node_of(one.position) + axis] = 1.0
+    relative = np.concatenate([journals, -support.motion_rows], axis=1)
+    w = frequency[:, None, None]
+    springs, dampers = model.bearing_coefficients(np.array([speed]))
+    total = np.zeros((len(frequency), relative.shape[1], relative.shape[1]), dtype=complex)
+    total[:, :size, :size] = stiffness - w**2 * mass + 1j * w * speed * gyroscopic
+    total += relative.T @ (springs + 1j * w * dampers) @ relative
+    total[:, size:, size:] -= w**2 * support.motion_mass
+    for index, soil in enumerate(model.soil_models):
+        for dof, cone in enumerate(soil.cones):
+            row = size + 6 * index + dof
+            total[:, row, row] += (
+                cone.translational_stiffness(frequency) if dof < 3 else
+                cone.rotational_stiffness(frequency,
+                                          second_moment=soil.contact.second_moments[dof - 3]))
+    scale = np.sqrt(np.abs(np.diagonal(total[0])))
+    return np.linalg.slogdet(total / (scale[:, None] * scale))
+
+
+def test_modes_on_cones_are_all_zeros_of_the_determinant_and_there_are_no_others():
+    # Argument principle: along a closed path the phase turns once for every zero inside it.
+    model = paper_machine(mass=420.0, elements=4)
+    left, right, low, high = 60.0, 1000.0, -20.0, 1500.0
+    corners = np.array([left + 1j * low, right + 1j * low, right + 1j * high, left + 1j * high,
+                        left + 1j * low])
+    share = np.linspace(0.0, 1.0, 1500)[:-1]
+    path = np.concatenate([a + (b - a) * share for a, b in itertools.pairwise(corners)])
+    sign, _ = determinant(model, np.append(path, path[0]))
+    turns = np.angle(sign[1:] / sign[:-1])
+    assert np.abs(turns).max() < 1.0
+    count = round(turns.sum() / (2.0 * math.pi))
+
+    w = campbell(model, np.array([500.0]), 14).eigenvalue[0] / 1j
+    inside = (w.real > left) & (w.real < right) & (w.imag < high)
+    # Cones have poles there: one of each rotation. A pole turns the phase the other way.
+    poles = sum(left < pole.real < right for cone in model.soil_models[0].cones[3:]
+                for pole in [1j * cone.wave_speed / cone.apex_height])
+    assert inside.sum() == count + poles
+    for mode in w[inside]:
+        ring = mode * (1.0 + 1e-6 * np.exp(2j * math.pi * np.arange(9) / 8.0))
+        sign, _ = determinant(model, ring)
+        turns = np.angle(sign[1:] / sign[:-1]).sum() / (2.0 * math.pi)
+        assert turns == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize('name, stiffness, rpm', [
+    ('FR_5.9.1_4000rpm', 1e6, 4000.0),
+    ('FR_5.9.2_0rads', [[1e6, 0.0], [0.0, 0.8e6]], 0.0),
+    ('FR_5.9.2_4000rpm', [[1e6, 0.0], [0.0, 0.8e6]], 4000.0),
+    ('FR_5.9.4_like_4000rpm', [[1e6, 0.5e6], [0.0, 1e6]], 4000.0)])
+def test_rotor_of_friswell_has_its_published_modes(name, stiffness, rpm):
+    given, expected, rtol = published(name)
+    model = CoupledModel(friswell(given, stiffness))
+    found = np.abs(campbell(model, np.array([rpm * math.pi / 30.0]), 8).eigenvalue[0])
+    nearest = found[np.abs(found[:, None] - expected).argmin(axis=0)]
+    np.testing.assert_allclose(nearest, expected, rtol=rtol)
+
+
+def test_three_disc_rotor_of_lalanne_and_ferraris_has_its_published_modes():
+    given, expected, rtol = published('LF_3disc_25000rpm')
+    model = CoupledModel(lalanne_ferraris(given, given['cxx'], given['czz']))
+    found = campbell(model, np.array([25000.0 * math.pi / 30.0]), 12).omega[0] / (2.0 * math.pi)
+    nearest = found[np.abs(found[:, None] - expected).argmin(axis=0)]
+    np.testing.assert_allclose(nearest, expected, rtol=rtol)
+
+
+@pytest.mark.usefixtures('no_shear')
+def test_overhung_disc_on_a_massless_shaft_whirls_as_its_closed_form_says():
+    given, expected, rtol = published('cf_cantilever_disc')
+    massless = Material(given['E'], 0.3, 0.0)
+    # A stub ten times as thick, 1e4 times as stiff, between two hard bearings is the wall.
+    shaft = (ShaftSection(1.0, (3.0, 3.0), (0.0, 0.0), 1, massless),
+             ShaftSection(given['L'], (given['d'],) * 2, (0.0, 0.0), 1, massless))
+    rotor = Rotor(0.0, shaft, (Disc('disc', 1.0 + given['L'], given['m'], given['Id'],
+                                    given['Ip']),),
+                  (bearing('a', 0.0, stiffness=1e14, foundation=None),
+                   bearing('b', 1.0, stiffness=1e14, foundation=None)))
+    found = campbell(CoupledModel(rotor), np.array([given['speed_rpm'] * math.pi / 30.0]), 6)
+    np.testing.assert_allclose(found.omega[0] / (2.0 * math.pi), expected, rtol=rtol)
+    np.testing.assert_array_equal(found.whirl[0], [-1, 1, -1, 1])
+    assert found.eigenvalue.shape == (1, 4)  # there are no more
+
+
+def test_subspace_that_is_too_small_is_enlarged(monkeypatch):
+    speeds = np.array([0.0, 3000.0])
+    expected = campbell(paper_machine(), speeds, 8).eigenvalue
+    monkeypatch.setattr(spectrum, '_MORE_SHAPES', 0)
+    monkeypatch.setattr(spectrum.ReducedRotor, 'of', _of_few(spectrum.ReducedRotor.of))
+    np.testing.assert_allclose(campbell(paper_machine(), speeds, 8).eigenvalue, expected,
+                               rtol=1e-8)
+
+
+def _of_few(of):
+    """Return a way to build a subspace from half as many modes as asked for."""
+    return lambda rotor, springs, *, count: of(rotor, springs, count=max(count // 3, 1))
+
+
+def test_elements_converge_to_the_same_modes_with_second_order():
+    coarse, middle, fine = (campbell(paper_machine(elements=elements), np.array([300.0]), 8)
+                            .eigenvalue[0, 3:7] for elements in (12, 24, 48))
+    rate = np.log2(np.abs(coarse - middle) / np.abs(middle - fine))
+    assert np.all(rate > 1.8), rate
+
+
+def test_rotor_at_rest_on_isotropic_springs_has_each_mode_in_both_directions():
+    found = campbell(paper_machine(RigidSoil()), np.zeros(1), 6)
+    np.testing.assert_array_equal(found.whirl[0], [-1, 1, -1, 1, -1, 1])
+    np.testing.assert_allclose(found.omega[0, ::2], found.omega[0, 1::2], rtol=2e-9)
+
+
+def test_forward_whirl_stiffens_and_backward_softens():
+    found = campbell(paper_machine(RigidSoil()), np.array([100.0, 500.0]), 6)
+    change = found.omega[1] - found.omega[0]
+    np.testing.assert_array_equal(np.sign(change), found.whirl[1])
+
+
+def test_cross_coupled_bearing_makes_forward_whirl_unstable():
+    cross = 2e6
+    rotor = uniform_rotor(
+        length=1.0, diameter=0.04, elements=8, material=STEEL,
+        discs=[Disc('d', 0.5, 20.0, 0.1, 0.2)],
+        bearings=[bearing('a', 0.0, stiffness=[[2e7, -cross], [cross, 2e7]], damping=50.0,
+                          foundation=None),
+                  bearing('b', 1.0, stiffness=2e7, damping=50.0, foundation=None)])
+    model = CoupledModel(rotor)
+    found = campbell(model, np.array([200.0]), 4)
+    np.testing.assert_allclose(found.eigenvalue[0], all_of(model, 200.0)[:4], rtol=1e-8)
+    unstable = found.damping_ratio[0] < 0.0
+    # f_x = -k_xz z pushes a shaft that moves from z into x along: k_xz < 0 drives forward.
+    np.testing.assert_array_equal(unstable[:2], found.whirl[0, :2] > 0)
+
+
+def test_curves_are_followed_through_their_crossings():
+    speeds = np.linspace(0.0, 942.0, 60)
+    found = campbell(paper_machine(mass=4200.0), speeds, 10)
+    crossed = 0
+    for name in range(10):
+        row, mode = np.nonzero(found.branch == name)
+        assert len(row) == 60
+        omega = found.omega[row, mode]
+        crossed += len(np.unique(mode)) > 1
+        # A curve that had been mixed up with another would have a kink.
+        bend = np.abs(np.diff(omega, 2))
+        assert bend.max() < 0.01 * (np.ptp(omega) + 10.0)
+    assert crossed >= 3
+
+
+def test_mode_beyond_the_table_of_a_soil_is_left_out():
+    omega = np.linspace(5.0, 500.0, 120)
+    table = ComplianceTable(omega, CONE.compliance(omega))
+    whole = campbell(paper_machine(mass=4200.0), np.array([300.0]), 10)
+    part = campbell(paper_machine(table, mass=4200.0), np.array([300.0]), 10)
+    known = whole.omega[0] < 500.0
+    assert 0 < known.sum() < 10
+    got = part.eigenvalue[0, :known.sum()]
+    np.testing.assert_allclose(got, whole.eigenvalue[0, known], rtol=2e-4)  # cubic spline
+    assert np.isnan(part.eigenvalue[0, known.sum():]).all()
+
+
+def rk4():
+    """Return the rotor kit of the measured run-up."""
+    return CoupledModel(uniform_rotor(
+        length=0.56, diameter=0.01, elements=28, material=Material(2.06e11, 0.3, 7850.0),
+        discs=[Disc('disc_1', 0.16, 0.8, 3.305e-4, 5.776e-4),
+               Disc('disc_2', 0.40, 0.8, 3.305e-4, 5.776e-4)],
+        bearings=[bearing(name, place, stiffness=1e6, damping=50.0, foundation=None)
+                  for name, place in (('a', 0.04), ('b', 0.52))]))
+
+
+def test_first_forward_critical_of_the_rotor_kit_is_that_of_the_note():
+    first = next(one for one in critical_speeds(rk4(), (50.0, 420.0)) if one.whirl > 0)
+    assert first.speed * 30.0 / math.pi == pytest.approx(2024.0, abs=0.5)  # printed digits
+
+
+def test_criticals_of_the_papers_machine_are_those_of_the_note():
+    criticals = critical_speeds(paper_machine(RigidSoil()), (10.0, 942.0))
+    np.testing.assert_allclose([one.speed / (2.0 * math.pi) for one in criticals],
+                               [44.01, 48.86, 123.12, 129.48], atol=0.005)  # printed digits
+    assert [one.whirl for one in criticals] == [-1, 1, -1, 1]
+
+
+def test_critical_speeds_without_damping_are_poles_of_the_synchronous_rotor():
+    model = paper_machine(RigidSoil(), damping=0.0)
+    criticals = critical_speeds(model, (10.0, 942.0))
+    for whirl, direction in ((1, 0), (-1, 1)):
+        inverse = np.sort(model._synchronous_modes.inverse[direction])[::-1]
+        got = [one.speed for one in criticals if one.whirl == whirl]
+        np.testing.assert_allclose(got, inverse[:len(got)] ** -0.5, rtol=1e-9)
+    assert all(math.isinf(one.amplification_factor) or one.amplification_factor > 1e9
+               for one in criticals)
+
+
+@pytest.mark.parametrize('model', [paper_machine(), paper_machine(mass=4200.0), two_blocks()],
+                         ids=['light', 'heavy', 'two blocks'])
+def test_critical_speed_is_the_frequency_of_a_mode_at_that_speed(model):
+    for one in critical_speeds(model, (20.0, 620.0)):
+        found = campbell(model, np.array([one.speed]), 24)
+        nearest = np.nanargmin(np.abs(found.omega[0] - one.speed))
+        assert found.omega[0, nearest] == pytest.approx(one.speed, rel=1e-9)
+        assert found.damping_ratio[0, nearest] == pytest.approx(one.damping_ratio, rel=1e-6)
+
+
+def test_critical_speeds_do_not_depend_on_the_grid():
+    model = paper_machine(mass=4200.0)
+    whole = [one.speed for one in critical_speeds(model, (10.0, 942.0))]
+    part = [one.speed for one in critical_speeds(model, (171.0, 800.0))]
+    np.testing.assert_allclose(part, [one for one in whole if 171.0 < one < 800.0], rtol=1e-9)
+
+
+def test_two_crossings_between_neighbouring_speeds_are_not_missed():
+    # A thin disc stiffens a forward mode so much that it nearly runs along with the speed.
+    rotor = uniform_rotor(
+        length=1.0, diameter=0.04, elements=4, material=STEEL,
+        discs=[Disc('d', 1.0, 15.0, 0.35, 0.345)],
+        bearings=[bearing('a', 0.0, stiffness=1e8, foundation=None),
+                  bearing('b', 0.7, stiffness=1e8, foundation=None)])
+    model = CoupledModel(rotor)
+    expected = np.sort(model._synchronous_modes.inverse[0])[::-1]
+    expected = expected[expected > 0.0] ** -0.5
+    top = 1.3 * expected[1]
+    got = [one.speed for one in critical_speeds(model, (1.0, top)) if one.whirl > 0]
+    np.testing.assert_allclose(got, expected[expected < top], rtol=1e-8)
+
+
+def test_shape_of_a_critical_is_the_deflection_that_unbalance_excites():
+    nodes = [Probe(f'n{i}', place) for i, place in enumerate(np.linspace(0.0, LENGTH, 8))]
+    model = paper_machine()
+    rotor = Rotor(0.6, model.rotor.shaft, model.rotor.discs, model.rotor.bearings, tuple(nodes))
+    model = CoupledModel(rotor, model.foundations, model.soil_models)
+    critical = next(one for one in critical_speeds(model, (280.0, 320.0)) if one.whirl > 0)
+    assert critical.damping_ratio < 1e-3
+    found = model.unbalance_response(np.array([critical.speed]), np.array([1e-5, 0.0]))
+    names = [f'{node.name}_{axis}' for node in nodes for axis in 'xz']
+    forced = found.displacement[0, [model.channels.index(name) for name in names]]
+    free = critical.deflection[[rotor.node_of(node.position) for node in nodes]].ravel()
+    free = free * (forced @ free.conj()) / (free @ free.conj())
+    # What other modes add: as much as the damping ratio.
+    np.testing.assert_allclose(free, forced, atol=2e-3 * np.abs(forced).max())
+    block = found.displacement[0, -6:]
+    scale = (forced @ critical.deflection[[rotor.node_of(node.position) for node in nodes]]
+             .ravel().conj()) / np.sum(np.abs(critical.deflection[
+                 [rotor.node_of(node.position) for node in nodes]]) ** 2)
+    np.testing.assert_allclose(scale * critical.support, block, atol=5e-3 * np.abs(block).max())
+    assert np.abs(critical.deflection).max() == pytest.approx(1.0)
+
+
+def test_amplification_factor_is_that_of_the_half_power_points():
+    model = paper_machine()
+    critical = next(one for one in critical_speeds(model, (280.0, 320.0)) if one.whirl > 0)
+    width = critical.speed * critical.damping_ratio
+    speeds = critical.speed + width * np.linspace(-3.0, 3.0, 2001)
+    found = model.unbalance_response(speeds, np.array([1e-5, 0.0]))
+    x, z = (found.displacement[:, model.channels.index(f'disc_2_{axis}')] for axis in 'xz')
+    forward = np.abs(z + 1j * x)
+    wide = speeds[forward > forward.max() / math.sqrt(2.0)]
+    assert speeds[forward.argmax()] == pytest.approx(critical.speed, rel=1e-6)
+    # The speed runs along with the mode, whose frequency grows with it: Omega (1 - d omega / d
+    # Omega) is what the half-power width sees.
+    slope = np.diff(campbell(model, critical.speed + np.array([-1.0, 1.0]), 5).omega[:, 4])[0] / 2
+    factor = critical.speed / np.ptp(wide) / (1.0 - slope)
+    assert factor == pytest.approx(critical.amplification_factor, rel=5e-3)  # 2001 points
+
+
+def test_margins_are_those_of_the_standard():
+    critical = critical_speeds(paper_machine(), (280.0, 320.0))[0]
+    assert critical.separation_margin(critical.speed / 1.25) == pytest.approx(0.25)
+    damped = type(critical)(300.0, 1, 0.5 / 2.4, critical.deflection, critical.support)
+    sharp = type(critical)(300.0, 1, 0.5 / 11.5, critical.deflection, critical.support)
+    assert damped.required_margin(250.0) == 0.0
+    assert sharp.required_margin(400.0) == pytest.approx(0.17 * 0.9)
+    assert sharp.required_margin(250.0) == pytest.approx(0.17 * 0.9 + 0.10)
+
+
+@pytest.mark.parametrize('call, rule', [
+    (lambda model: campbell(model, np.array([-1.0]), 3), 'speeds must be >= 0 rad/s and finite'),
+    (lambda model: campbell(model, np.array([math.nan]), 3), 'speeds must be >= 0 rad/s'),
+    (lambda model: campbell(model, np.empty(0), 3), 'speeds must be >= 0 rad/s'),
+    (lambda model: campbell(model, np.ones(1), 0), 'count must be at least 1 mode, got 0'),
+    (lambda model: critical_speeds(model, (5.0, 5.0)), 'speed range must be 0 <= low < high')])
+def test_impossible_request_is_refused(call, rule):
+    with pytest.raises(RotorSoilError, match=rule):
+        call(paper_machine())
+
+
+def test_damper_alone_holds_no_shaft_but_damps_it():
+    rotor = uniform_rotor(
+        length=1.0, diameter=0.04, elements=8, material=STEEL,
+        discs=[Disc('d', 0.5, 20.0, 0.1, 0.2)],
+        bearings=[bearing('a', 0.0, stiffness=2e7, foundation=None),
+                  bearing('b', 1.0, stiffness=2e7, foundation=None),
+                  Bearing('damper', 0.5, None, np.zeros((2, 2)), 900.0 * np.eye(2))])
+    model = CoupledModel(rotor)
+    found = campbell(model, np.array([200.0]), 6)
+    np.testing.assert_allclose(found.eigenvalue[0], all_of(model, 200.0)[:6], rtol=1e-8)
