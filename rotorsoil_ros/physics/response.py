@@ -90,8 +90,8 @@ class ResponseTable:
         forces = model.plane_forces
         # Unbalance turns forward only. Forces along x and along z alone also see the backward
         # resonances, of which unbalance may show a narrow trace.
-        single = [np.where(np.abs(forces.reshape(len(forces) // 2, 2, planes)) > 0.0, axis, 0.0).reshape(
-            forces.shape) for axis in (np.array([[[1.0], [0.0]]]), np.array([[[0.0], [1.0]]]))]
+        acts = np.abs(forces.reshape(len(forces) // 2, 2, planes)) > 0.0
+        single = [(acts * axis[:, None]).reshape(forces.shape) for axis in np.eye(2)]
         loads = np.concatenate([forces, *single], axis=1)
 
         def solve(speed: FloatArray) -> tuple[ComplexArray, ComplexArray]:

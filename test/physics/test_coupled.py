@@ -210,7 +210,8 @@ def three_collinear():
 def test_three_collinear_bearings_stand_on_one_block():
     model = three_collinear()
     seats = model.support.standing(np.array([100.0])).receptance[0]
-    assert np.linalg.matrix_rank(seats, tol=1e-12 * np.abs(seats).max()) == 4  # of six: not invertible
+    rank = np.linalg.matrix_rank(seats, tol=1e-12 * np.abs(seats).max())
+    assert rank == 4  # of six: not invertible
     fast = model.unbalance_response(SPEEDS, UNBALANCE)
     slow = dense_response(model, SPEEDS, UNBALANCE)
     scale = np.abs(slow.displacement).max(axis=1, keepdims=True)
