@@ -16,7 +16,6 @@ from rotorsoil_ros.physics.response import ResponseTable
 from rotorsoil_ros.physics.soil import SoilModel
 from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
 
-
 # Amplification factor below which a critical speed needs no margin (API 617).
 _FELT = 2.5
 

@@ -1,4 +1,4 @@
-"""Where did a run pass a resonance, and was it where and as high as predicted?"""
+"""Where a run passed a resonance, and whether that was where and as high as predicted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from scipy.signal import find_peaks
 
 from rotorsoil_ros.physics.arrays import FloatArray
 from rotorsoil_ros.physics.quasistatic import (
+    DECAY,
     LARGEST_SHIFT,
     passage_number,
     Resonance,
@@ -43,12 +44,15 @@ class Passage:
         Where [rad/s] and how high [m, rad].
     rate : float
         Of the speed there [rad/s^2]; negative in a run-down.
+    sweep : int
+        Number of the run-up or run-down.
 
     """
 
     speed: float
     amplitude: float
     rate: float
+    sweep: int = 0
 
     def number(self, damping_ratio: float) -> float:
         """Return the passage number p for a mode of some damping."""
@@ -84,7 +88,7 @@ def passages(time: FloatArray, speed: FloatArray, amplitude: FloatArray) -> list
     time, speed, amplitude = time[given], speed[given], amplitude[given]
     found = []
     rate = speed_rate(time, speed)
-    for sweep in sweeps(speed):
+    for number, sweep in enumerate(sweeps(speed)):
         smooth = amplitude[sweep]
         for samples, width in _MEDIANS:
             if len(smooth) >= samples:
@@ -94,8 +98,53 @@ def passages(time: FloatArray, speed: FloatArray, amplitude: FloatArray) -> list
                        + np.finfo(float).tiny)
         peaks, _ = find_peaks(level, prominence=math.log(_PROMINENCE))
         found += [Passage(float(speed[sweep][peak]), float(smooth[peak]),
-                          float(rate[sweep][peak])) for peak in peaks]
+                          float(rate[sweep][peak]), number) for peak in peaks]
     return found
+
+
+def without_ringing(
+    found: Sequence[Passage], resonances: Sequence[Resonance],
+) -> tuple[list[Passage], list[Passage]]:
+    """
+    Part peaks from lobes that may be the free vibration after a larger peak passed too fast.
+
+    Parameters
+    ----------
+    found : sequence of Passage
+        Measured peaks, in the order of time.
+    resonances : sequence of Resonance
+        Critical speeds of the machine; the nearest one tells how fast a vibration dies away.
+
+    Returns
+    -------
+    two lists of Passage
+        Peaks, and lobes.
+
+    """
+    peaks: list[Passage] = []
+    lobes: list[Passage] = []
+    for passage in found:
+        rings = any(
+            before.sweep == passage.sweep and before.amplitude > passage.amplitude
+            and abs(passage.speed - before.speed) < ringing_reach(
+                damping_beside(before.speed, resonances), before)
+            for before in peaks)
+        (lobes if rings else peaks).append(passage)
+    return peaks, lobes
+
+
+def ringing_reach(damping_ratio: float, passage: Passage) -> float:
+    """Return how far behind a peak its free vibration lasts [rad/s]; 0 if passed slowly."""
+    number = passage.number(damping_ratio)
+    if not number < SLOW_ENOUGH:
+        return 0.0
+    return DECAY / max(number, np.finfo(float).tiny) * math.sqrt(abs(passage.rate))
+
+
+def damping_beside(speed: float, resonances: Sequence[Resonance]) -> float:
+    """Return the damping ratio of the resonance nearest to a speed [rad/s], NaN of none."""
+    return min(resonances, key=lambda resonance: abs(resonance.speed - speed),
+               default=Resonance(0.0, math.nan)).damping_ratio
 
 
 def sweeps(speed: FloatArray) -> list[slice]:
@@ -179,8 +228,7 @@ def pair(
 
     """
     def damping_ratio(passage: Passage) -> float:
-        return min(resonances, key=lambda resonance: abs(resonance.speed - passage.speed),
-                   default=Resonance(0.0, math.nan)).damping_ratio
+        return damping_beside(passage.speed, resonances)
 
     distance = {(i, j): abs(there.speed / here.speed - 1.0)
                 for i, here in enumerate(predicted) for j, there in enumerate(measured)
