@@ -26,7 +26,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', sorted(glob('config/*.yaml'))),
-        (f'share/{NAME}/launch', sorted(glob('launch/*.py'))),
+        (f'share/{NAME}/launch', sorted(glob('launch/*.py') + glob('launch/*.yaml'))),
     ],
     zip_safe=False,
     install_requires=[

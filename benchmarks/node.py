@@ -1,12 +1,13 @@
 """
 Measure what physics costs beside a node that only answers.
 
-Runs rotorsoil_node and a bare rclpy node one after the other, as processes of their own, on the
-same messages: JointState in, two JointStates of the same channels out, same executor and QoS.
-Prints median and 99th percentile of the latency at several rates, CPU share at each, the
-sustained rate, resident memory, and the ratios.
+Runs rotorsoil_node and a bare rclpy node in turns, as processes of their own, on the same
+messages: JointState in, two JointStates of the same channels out, same executor and QoS; ours
+without a log, with MCAP, and with MCAP and rerun. Prints the median over all rounds of: median
+and 99th percentile of the latency at several rates, CPU share at each, the sustained rate and
+resident memory; and their ratios to those of the bare node.
 
-    python benchmarks/node.py [--seconds S]
+    python benchmarks/node.py [--seconds S] [--rounds N]
 """
 
 import argparse
@@ -24,15 +25,17 @@ import time
 
 import numpy as np
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 DOMAIN = '57'
-RATES_HZ = (10, 100, 1000)
+RATES_HZ = (10, 100, 1000, 5000)
 WINDOW = 32
 RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -89,17 +92,25 @@ class Driver:
     """Publishes speeds and receives answers, both as bytes, so that it is not what is measured."""
 
     def __init__(self) -> None:
-        self.node = rclpy.create_node('benchmark_driver')
+        self.context = Context()
+        rclpy.init(context=self.context)
+        self.node = Node('benchmark_driver', context=self.context)
         self.publisher = self.node.create_publisher(
             JointState, 'paper_rotor/joint_states', RELIABLE)
         self.received = 0
         self.latencies: list[int] = []
         self.node.create_subscription(JointState, 'rotorsoil/paper_rotor/amplitude',
                                       self._on_answer, RELIABLE, raw=True)
-        self.executor = EventsExecutor()
+        self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
         message = JointState(name=['rotor'], position=[0.0], velocity=[300.0], effort=[0.0])
         self._bytes = bytearray(serialize_message(message))
+
+    def close(self) -> None:
+        """Leave the graph altogether: who stays would be one more to be served."""
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.shutdown()
 
     def _on_answer(self, data: bytes) -> None:
         seconds, nanoseconds = struct.unpack_from('<iI', data, 4)
@@ -156,7 +167,8 @@ class Driver:
 @contextmanager
 def process(command: list[str]) -> Iterator[subprocess.Popen[bytes]]:
     """Run a command and stop it by SIGINT."""
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL,
+                          stderr=subprocess.DEVNULL) as running:
         try:
             yield running
         finally:
@@ -194,43 +206,62 @@ def measure(command: list[str], seconds: float) -> Figures:
             figures.sustained_hz = driver.saturate(seconds)
             figures.memory_mib = resident_mib(running.pid)
     finally:
-        driver.node.destroy_node()
+        driver.close()
     return figures
 
 
-def report(bare: Figures, ours: Figures) -> None:
-    """Print both and their ratios."""
-    print(f'{"":24}{"bare node":>14}{"rotorsoil":>14}{"ratio":>9}')
-
-    def row(name: str, one: float, other: float, unit: str) -> None:
-        print(f'{name:24}{one:>10.1f} {unit:3}{other:>10.1f} {unit:3}{other / one:>9.2f}')
-
+def rows(figures: Figures) -> dict[str, tuple[float, str]]:
+    """Return what is printed of one run: name, value, unit."""
+    found: dict[str, tuple[float, str]] = {}
     for rate in RATES_HZ:
-        row(f'median latency {rate} Hz', bare.latency_us[rate][0], ours.latency_us[rate][0], 'us')
-        row(f'99th percentile {rate} Hz', bare.latency_us[rate][1], ours.latency_us[rate][1],
-            'us')
-        row(f'CPU share {rate} Hz', 100 * bare.cpu_share[rate], 100 * ours.cpu_share[rate], '%')
-        if bare.lost[rate] or ours.lost[rate]:
-            print(f'  unanswered at {rate} Hz: {bare.lost[rate]} and {ours.lost[rate]}')
-    row('sustained rate', bare.sustained_hz, ours.sustained_hz, 'Hz')
-    row('resident memory', bare.memory_mib, ours.memory_mib, 'MiB')
+        median, tail = figures.latency_us[rate]
+        found[f'median latency {rate} Hz'] = median, 'us'
+        found[f'99th percentile {rate} Hz'] = tail, 'us'
+        found[f'CPU share {rate} Hz'] = 100.0 * figures.cpu_share[rate], '%'
+        found[f'unanswered {rate} Hz'] = float(figures.lost[rate]), ''
+    found['sustained rate'] = figures.sustained_hz, 'Hz'
+    found['resident memory'] = figures.memory_mib, 'MiB'
+    return found
+
+
+def report(runs: dict[str, list[Figures]]) -> None:
+    """Print the median of all rounds of each node, and its ratio to the bare one."""
+    tables = {name: [rows(figures) for figures in found] for name, found in runs.items()}
+    print(f'{"":24}' + ''.join(f'{name:>22}' for name in tables))
+    for row, (_, unit) in tables['bare'][0].items():
+        middle = {name: float(np.median([one[row][0] for one in table]))
+                  for name, table in tables.items()}
+        bare = middle['bare']
+        cells = [f'{value:>10.1f} {unit:4}' + (f'{value / bare:>7.2f}' if bare else ' ' * 7)
+                 for value in middle.values()]
+        print(f'{row:24}' + ''.join(cells))
+
+
+def commands(directory: Path) -> dict[str, list[str]]:
+    """Return what is measured: the bare node, and ours with more and more of a log."""
+    ours = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args',
+            '-p', 'machines:=[paper_rotor]', '-p', f'paper_rotor.case:={CASE}',
+            '-p', 'speed_depth:=1000', '-p', f'cache:={directory / "cache"}']
+    logged = [*ours, '-p', f'log.directory:={directory / "logs"}', '-p']
+    return {'bare': [sys.executable, '-c', BARE], 'no log': ours,
+            'MCAP': [*logged, 'log.rerun:=false'], 'MCAP and rerun': [*logged, 'log.rerun:=true']}
 
 
 def main() -> None:
     """Measure a bare node and rotorsoil_node."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--seconds', type=float, default=5.0, help='per rate')
-    seconds = parser.parse_args().seconds
+    parser.add_argument('--seconds', type=float, default=3.0, help='per rate')
+    parser.add_argument('--rounds', type=int, default=3, help='of all nodes in turn')
+    arguments = parser.parse_args()
     os.environ.update(ROS_DOMAIN_ID=DOMAIN, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
                       OMP_NUM_THREADS='1')
-    rclpy.init()
-    with tempfile.TemporaryDirectory() as cache:
-        ours = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args',
-                '-p', 'machines:=[paper_rotor]', '-p', f'paper_rotor.case:={CASE}',
-                '-p', 'speed_depth:=1000', '-p', f'cache:={cache}']
-        with suppress(KeyboardInterrupt, ExternalShutdownException):
-            report(measure([sys.executable, '-c', BARE], seconds), measure(ours, seconds))
-    rclpy.try_shutdown()
+    with tempfile.TemporaryDirectory() as directory, suppress(
+            KeyboardInterrupt, ExternalShutdownException):
+        runs: dict[str, list[Figures]] = {}
+        for _ in range(arguments.rounds):
+            for name, command in commands(Path(directory)).items():
+                runs.setdefault(name, []).append(measure(command, arguments.seconds))
+        report(runs)
 
 
 if __name__ == '__main__':

@@ -88,8 +88,8 @@ def test_units_is_the_only_60():
 def test_nothing_below_the_node_reads_the_clock():
     readers = {path.name for floor in FLOORS.values() for path in floor
                if {'time', 'datetime'} & set(imported_by(path))}
-    # replay waits on purpose; the node has a clock of its own
-    assert readers <= {'replay.py'}
+    # replay waits on purpose; recover writes stamps as dates; the node has a clock of its own
+    assert readers <= {'replay.py', 'recover.py'}
 
 
 def calls(path):
@@ -107,7 +107,9 @@ def test_nothing_substitutes_a_number_for_a_failure():
 def test_no_compliance_is_inverted():
     inverted = [(name_of(path), of) for path in ROOMS for name, of in calls(path)
                 if name in ('inv', 'pinv')]
-    assert [pair for pair in inverted if 'compliance' in pair[1] or 'receptance' in pair[1]] == []
+    wrong = {where for where, of in inverted if 'compliance' in of or 'receptance' in of}
+    # The independent route in time needs the stiffness itself, of what is free to move.
+    assert wrong <= {'rotorsoil_ros.physics.time_domain'}
 
 
 def test_package_holds_no_host_and_no_path_of_a_machine():

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import os
 from pathlib import Path
 import subprocess
 import sys
@@ -179,7 +180,7 @@ def test_table_that_cannot_be_stored_is_used_all_the_same(capsys, tmp_path, capl
     (['response', PAPER, '--rpm', '60:900:3', '-o', '/nothing/x.csv'],
      '/nothing/x.csv: No such file or directory'),
     (['response', PAPER, '--rpm', '60:900:3', '-o', '/dev/full'],
-     'standard output: No space left on device'),
+     '/dev/full: No space left on device'),
     (['plot', KIT, '-o', f'{PAPER}/below'], f'{PAPER}/below: Not a directory'),
     (['compliance', KIT, '--hz', '0:1:2'],
      f'{KIT}: foundations: --foundation must be one of none, there is no block, got None'),
@@ -225,16 +226,21 @@ def test_bad_command_line_is_one_line_and_status_2(arguments, problem, capsys):
 
 
 def test_plot_writes_every_picture(tmp_path, capsys):
-    assert main(['plot', PAPER, '-o', str(tmp_path / 'new' / 'plots')]) == 0
+    assert main(['plot', PAPER, '-o', str(tmp_path / 'new' / 'plots'),
+                 '--cache', str(tmp_path / 'cache')]) == 0
     names = {Path(line).stem for line in capsys.readouterr().out.splitlines()}
     assert names == {'machine', 'support', 'bode_journals', 'bode_housings', 'bode_discs',
-                     'bode_foundations', 'bode_rocking', 'orbits', 'shapes'}
+                     'bode_foundations', 'bode_rocking', 'orbits', 'shapes', 'campbell',
+                     'critical_shapes', 'polar', 'mass_ratios', 'compliance_block'}
     for path in (tmp_path / 'new' / 'plots').iterdir():
         assert path.read_bytes().startswith(b'\x89PNG')
 
 
 def test_machine_that_does_not_move_is_drawn_all_the_same(tmp_path, capsys):
-    assert main(['plot', PAPER, '--set', 'unbalances=[]', '-o', str(tmp_path)]) == 0
+    assert main(['plot', PAPER, '--set', 'unbalances=[]', '--set', 'soil.poisson_ratio=0.495',
+                 '-o', str(tmp_path), '--cache', str(tmp_path / 'cache')]) == 0
+    # infinite elements refuse that soil: what is not drawn is told
+    assert capsys.readouterr().err.startswith('no picture compliance_block: poisson_ratio')
     assert (tmp_path / 'bode_discs.png').exists()
 
 
@@ -247,6 +253,15 @@ def test_help_needs_no_numpy():
                           check=True)
     assert done.stderr == 'set()\n'
     assert 'VERB' in done.stdout
+
+
+def test_full_disk_behind_standard_output_is_one_line_and_status_2():
+    with open('/dev/full', 'w') as full:
+        done = subprocess.run([*PROGRAM, 'check', PAPER], cwd=ROOT,
+                              env={**os.environ, 'PYTHONUNBUFFERED': ''}, stdout=full,
+                              stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr == 'standard output: No space left on device\n'
 
 
 def test_reader_that_has_seen_enough_hears_no_complaint():

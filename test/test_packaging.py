@@ -22,7 +22,7 @@ ROS_NAMES = {
     'PyYAML': {'python3-yaml'}, 'mcap': {'python3-mcap-pip'},
     'scikit-fem': {'python3-scikit-fem-pip'},
     'ros-jazzy-rclpy': {'rclpy', 'lifecycle_msgs', 'rcl_interfaces'},
-    'ros-jazzy-common-interfaces': {'sensor_msgs', 'std_msgs', 'diagnostic_msgs'},
+    'ros-jazzy-common-interfaces': {'sensor_msgs', 'std_msgs', 'std_srvs', 'diagnostic_msgs'},
     'ros-rclpy': {'rclpy'}, 'setuptools': set(),
 }
 

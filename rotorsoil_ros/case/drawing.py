@@ -59,6 +59,8 @@ def _extent(case: Case) -> tuple[float, float, float, float]:
 
 
 def _support(case: Case) -> str:
+    if case.support.model == 'table':
+        return 'ground as its file says'
     if case.soil is None or case.support.model == 'rigid':
         return 'rigid ground'
     return (f'{case.support.model.replace("_", " ")} on soil of G = '

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case, infinite_range
+from rotorsoil_ros.physics.compliance_table import ComplianceTable
 from rotorsoil_ros.physics.cone import ConeModel
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import InputError
@@ -31,7 +32,7 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
         If infinite elements do not converge.
 
     """
-    return CoupledModel(case.rotor, case.foundations, soil_models(case, directory))
+    return CoupledModel(case.rotor, case.foundations, soil_models(case, directory), case.couples)
 
 
 def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:
@@ -43,6 +44,8 @@ def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:
 def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
     if case.support.model == 'rigid':
         return RigidSoil()
+    if case.support.model == 'table':
+        return case.tables[index]
     if case.soil is None:
         raise InputError(f'{case.path}: soil: is missing')
     contact = case.foundations[index].contact
@@ -89,7 +92,8 @@ def compliance_key(soil: Soil, geometry: str, a0_min: float, a0_max: float) -> s
 def response_key(case: Case, model: CoupledModel) -> str:
     """Return what identifies the response table of a case: all of it but its unbalance."""
     return content_key('response', TOLERANCE, model.rotor, model.foundations,
-                       [_identity(soil) for soil in model.soil_models], case.speed_range)
+                       [_identity(soil) for soil in model.soil_models], case.speed_range,
+                       model.couples)
 
 
 def key_of(model: InfiniteElementModel) -> str:
@@ -101,6 +105,8 @@ def key_of(model: InfiniteElementModel) -> str:
 def _identity(model: SoilModel) -> object:
     if isinstance(model, InfiniteElementModel):
         return ['infinite', model.soil, model.contact, key_of(model)]
+    if isinstance(model, ComplianceTable):
+        return ['table', model.omega, model.values]
     return model
 
 

@@ -61,7 +61,8 @@ def channel_groups(case: Case) -> dict[str, list[str]]:
         'journals': [f'{bearing.name}_journal_{axis}' for bearing in rotor.bearings
                      for axis in 'xz'],
         'housings': [f'{bearing.name}_housing_{axis}' for bearing in rotor.bearings
-                     for axis in 'xz' if case.support.model != 'rigid'],
+                     for axis in 'xz'
+                     if case.support.model != 'rigid' or bearing.pedestal is not None],
         'discs': [f'{disc.name}_{axis}' for disc in rotor.discs for axis in 'xz'],
         'probes': [f'{probe.name}_{axis}' for probe in rotor.probes for axis in 'xz'],
     }
@@ -93,9 +94,10 @@ def support(case: Case, model: CoupledModel) -> Figure:
         column[0].set_ylabel(f'Re 1/N, spring [{stiffness}]')
         column[1].set_ylabel(f'Im 1/N, damping [{stiffness}]')
         column[2].set(ylabel=f'compliance |N| [{compliance}]', xlabel='frequency [Hz]')
-        column[0].legend(fontsize=7)
+        if column[0].get_lines():
+            column[0].legend(fontsize=7)
     for axes in grid.flat:
-        _tidy(axes)
+        tidy(axes)
     figure.suptitle(f'{case.name}: soil below the massless contact, one direction at a time',
                     fontsize=10)
     return figure
@@ -123,8 +125,8 @@ def bode(predictor: Predictor, channels: Sequence[str], title: str) -> Figure:
               yticks=range(-180, 181, 90))
     if amplitude.get_lines():
         amplitude.legend(fontsize=7, ncols=2)
-    _tidy(amplitude)
-    _tidy(phase)
+    tidy(amplitude)
+    tidy(phase)
     figure.suptitle(title, fontsize=10)
     return figure
 
@@ -198,7 +200,7 @@ def _draw_shape(axes: Axes, case: Case, nodes: FloatArray, shape: ComplexArray) 
     for disc in case.rotor.discs:
         axes.axvline(disc.position, color='#d9a441', linewidth=1.5, alpha=0.6)
     axes.axhline(0.0, color='black', linewidth=0.5)
-    _tidy(axes)
+    tidy(axes)
 
 
 def trend(
@@ -219,13 +221,14 @@ def trend(
     bottom.set(xlabel='time [s]', ylabel='amplitude, zero-to-peak [um]')
     bottom.set_ylim(bottom=_LOWEST_TREND)
     bottom.legend(fontsize=7, ncols=5, loc='upper center', bbox_to_anchor=(0.5, -0.14))
-    _tidy(top)
-    _tidy(bottom)
+    tidy(top)
+    tidy(bottom)
     figure.suptitle(title, fontsize=10)
     return figure
 
 
-def _tidy(axes: Axes) -> None:
+def tidy(axes: Axes) -> None:
+    """Give axes a light grid and small figures."""
     axes.grid(alpha=0.3)
     axes.tick_params(labelsize=8)
     axes.margins(x=0.01)

@@ -2,66 +2,33 @@
 
 from collections.abc import Hashable
 import difflib
-import math
-import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, model_validator, Tag, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.quantities import (
+    BalanceGrade,
+    Count,
+    FileName,
+    Kilogram,
+    KilogramMetre,
+    KilogramPerCubicMetre,
+    KilogramPerMetre,
+    KilogramSquareMetre,
+    Metre,
+    Name,
+    NewtonPerMetre,
+    NewtonSecondPerMetre,
+    Pascal,
+    Radian,
+    Ratio,
+    Rpm,
+)
 
-# Larger than any stiffness or speed; products of such numbers still fit into a double.
-_LARGEST_NUMBER = 1e18
-# More elements in one section are a slip of the keyboard and would fill the memory.
-_LARGEST_COUNT = 1000
-_NAME = re.compile(r'[a-z][a-z0-9_]{0,63}')
-
-
-def _number_in(unit: str) -> BeforeValidator:
-    """Return a validator that takes finite numbers only: no text, no truth value."""
-    rule = f'must be a finite number{unit and f" in {unit}"}'
-
-    def validate(value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f'{rule}, got {shown(value)}')
-        if not math.isfinite(value):
-            raise ValueError(f'{rule}, got {value}')
-        if abs(value) > _LARGEST_NUMBER:
-            raise ValueError(f'{rule} of at most {_LARGEST_NUMBER:g}, got {value:g}')
-        return float(value)
-
-    return BeforeValidator(validate)
-
-
-def _name(value: object) -> str:
-    if not isinstance(value, str) or not _NAME.fullmatch(value):
-        raise ValueError('must be a name of at most 64 small letters, digits and _, first a '
-                         f'letter, got {shown(value)}')
-    return value
-
-
-def _count(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value > _LARGEST_COUNT:
-        raise ValueError(f'must be a whole number up to {_LARGEST_COUNT}, got {shown(value)}')
-    return value
-
-
-Name = Annotated[str, BeforeValidator(_name)]
-Count = Annotated[int, BeforeValidator(_count)]
-Ratio = Annotated[float, _number_in('')]
-Metre = Annotated[float, _number_in('m')]
-Kilogram = Annotated[float, _number_in('kg')]
-KilogramPerMetre = Annotated[float, _number_in('kg/m')]
-KilogramMetre = Annotated[float, _number_in('kg m')]
-KilogramSquareMetre = Annotated[float, _number_in('kg m^2')]
-KilogramPerCubicMetre = Annotated[float, _number_in('kg/m^3')]
-Pascal = Annotated[float, _number_in('Pa')]
-NewtonPerMetre = Annotated[float, _number_in('N/m')]
-NewtonSecondPerMetre = Annotated[float, _number_in('N s/m')]
-Radian = Annotated[float, _number_in('rad')]
-Rpm = Annotated[float, _number_in('rpm')]
-
+# Which of two shapes a value has, where a file may choose; no key can be called so.
+_CONSTANT, _TABLE, _NUMBER, _AXES = '<constant>', '<table>', '<number>', '<axes>'
 
 class Entry(BaseModel):
     """One mapping of a case file."""
@@ -98,8 +65,9 @@ class Soil(Entry):
 class Support(Entry):
     """Which model of the soil stands below the blocks."""
 
-    model: Literal['rigid', 'cone', 'infinite_elements']
+    model: Literal['rigid', 'cone', 'infinite_elements', 'table']
     geometry: Literal['disc', 'plane_strain', 'plane_stress'] = 'disc'
+    file: FileName | None = None
 
 
 class Foundation(Entry):
@@ -114,6 +82,7 @@ class Foundation(Entry):
     centre_of_gravity_height: Metre
     inertia: tuple[KilogramSquareMetre, KilogramSquareMetre, KilogramSquareMetre]
     height: Metre | None = None
+    stiffness_file: FileName | None = None
 
 
 class Material(Entry):
@@ -138,13 +107,17 @@ class Section(Entry):
 
 
 class Disc(Entry):
-    """Rigid disc."""
+    """Rigid disc, by its mass and inertias or by its dimensions."""
 
     name: Name
     position: Metre
-    mass: Kilogram
-    diametral_inertia: KilogramSquareMetre
-    polar_inertia: KilogramSquareMetre
+    mass: Kilogram | None = None
+    diametral_inertia: KilogramSquareMetre | None = None
+    polar_inertia: KilogramSquareMetre | None = None
+    outer_diameter: Metre | None = None
+    inner_diameter: Metre = 0.0
+    width: Metre | None = None
+    density: KilogramPerCubicMetre | None = None
 
 
 class Stiffness(Entry):
@@ -165,14 +138,66 @@ class Damping(Entry):
     zz: NewtonSecondPerMetre
 
 
+class StiffnessTable(Entry):
+    """Stiffness at some speeds of the rotor."""
+
+    speed_rpm: list[Rpm]
+    xx: list[NewtonPerMetre]
+    xz: list[NewtonPerMetre] | None = None
+    zx: list[NewtonPerMetre] | None = None
+    zz: list[NewtonPerMetre]
+
+
+class DampingTable(Entry):
+    """Damping at some speeds of the rotor."""
+
+    speed_rpm: list[Rpm]
+    xx: list[NewtonSecondPerMetre]
+    xz: list[NewtonSecondPerMetre] | None = None
+    zx: list[NewtonSecondPerMetre] | None = None
+    zz: list[NewtonSecondPerMetre]
+
+
+def _over_speed(value: object) -> str:
+    is_table = (isinstance(value, (StiffnessTable, DampingTable))
+                or (isinstance(value, dict) and 'speed_rpm' in value))
+    return _TABLE if is_table else _CONSTANT
+
+
+def _per_axis(value: object) -> str:
+    return _AXES if isinstance(value, (dict, MassPerAxis)) else _NUMBER
+
+
+class MassPerAxis(Entry):
+    """Mass that differs between the directions."""
+
+    xx: Kilogram
+    zz: Kilogram
+
+
+class Pedestal(Entry):
+    """Elastic structure between a bearing's housing and the block."""
+
+    mass: Annotated[
+        Annotated[Kilogram, Tag(_NUMBER)] | Annotated[MassPerAxis, Tag(_AXES)],
+        Discriminator(_per_axis)]
+    stiffness: Stiffness
+    damping: Damping
+
+
 class Bearing(Entry):
     """Bearing and the block below it."""
 
     name: Name
     position: Metre
     foundation: Name | None = None
-    stiffness: Stiffness
-    damping: Damping
+    stiffness: Annotated[
+        Annotated[Stiffness, Tag(_CONSTANT)] | Annotated[StiffnessTable, Tag(_TABLE)],
+        Discriminator(_over_speed)]
+    damping: Annotated[
+        Annotated[Damping, Tag(_CONSTANT)] | Annotated[DampingTable, Tag(_TABLE)],
+        Discriminator(_over_speed)]
+    pedestal: Pedestal | None = None
 
 
 class Probe(Entry):
@@ -194,11 +219,16 @@ class Rotor(Entry):
 
 
 class Unbalance(Entry):
-    """Unbalance on one disc."""
+    """Unbalance on one disc: a moment, or what a balance grade permits, and a couple."""
 
     disc: Name
-    moment: KilogramMetre
+    moment: KilogramMetre | None = None
+    grade: BalanceGrade | None = None
+    rated_speed_rpm: Rpm | None = None
+    share: Ratio = 1.0
     phase: Radian = 0.0
+    couple: KilogramSquareMetre | None = None
+    couple_phase: Radian = 0.0
 
 
 class Document(Entry):
@@ -223,15 +253,20 @@ _WHAT = {
 }
 
 
-def first_fault(error: ValidationError) -> tuple[tuple[int | str, ...], str]:
+Place: TypeAlias = tuple[int | str, ...]
+
+
+def first_fault(error: ValidationError) -> tuple[Place, str]:
     """Return where a document is at fault first, and what is wrong there, in one line."""
     detail: ErrorDetails = error.errors(include_url=False)[0]
     context = detail.get('ctx', {})
+    place = tuple(step for step in detail['loc']
+                  if step not in (_CONSTANT, _TABLE, _NUMBER, _AXES))
     if detail['type'] == 'unknown_key':
-        return (*detail['loc'], str(context['key'])), context['problem']
+        return (*place, str(context['key'])), context['problem']
     if detail['type'] == 'value_error':
-        return detail['loc'], str(context['error'])
+        return place, str(context['error'])
     got = shown(detail['input'])
     if detail['type'] not in _WHAT:
-        return detail['loc'], f'{detail["msg"]}, got {got}'
-    return detail['loc'], _WHAT[detail['type']].format(input=got, **context)
+        return place, f'{detail["msg"]}, got {got}'
+    return place, _WHAT[detail['type']].format(input=got, **context)

@@ -27,9 +27,10 @@ def derived_quantities(
     yield 'speed range', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm'
     yield 'rotor mass', f'{case.rotor.mass:.4g} kg'
     yield 'mesh', f'{len(case.rotor.node_positions)} nodes on {case.rotor.length:g} m of shaft'
-    for disc, value in zip(case.rotor.discs, case.unbalance, strict=True):
-        yield f'unbalance of {disc.name}', (
-            f'{abs(value):g} kg m at {np.angle(value):g} rad')
+    planes = [*((disc.name, 'kg m') for disc in case.rotor.discs),
+              *((f'{name}, couple', 'kg m^2') for name in case.couples)]
+    for (name, unit), value in zip(planes, case.unbalance, strict=True):
+        yield f'unbalance of {name}', f'{abs(value):g} {unit} at {np.angle(value):g} rad'
     yield 'support model', case.support.model
     if case.soil is not None:
         yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
@@ -49,9 +50,11 @@ def _of_foundation(
             f'{foundation.mass / (case.soil.density * radius**3):.4g}')
         low, high = (a0(case.soil, foundation, speed) for speed in case.speed_range)
         yield f'{name}: a0', f'{low:.3g} to {high:.3g}'
-    # A strip gives way without bound at rest: its stiffness is told where the machine starts.
+    # A strip gives way without bound at rest, and a file may not know rest: theirs is told where
+    # the machine starts.
     where, omega = 'static', 0.0
-    if case.support.model == 'infinite_elements' and case.support.geometry != 'disc':
+    strip = case.support.model == 'infinite_elements' and case.support.geometry != 'disc'
+    if strip or case.support.model == 'table':
         where, omega = 'slowest', case.speed_range[0]
     for dof, compliance in zip(DOFS, np.diagonal(model.compliance(np.array([omega]))[0]),
                                strict=True):

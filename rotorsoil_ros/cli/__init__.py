@@ -40,8 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             status = int(verb(arguments))
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader has seen enough; Python would complain once more while closing the stream.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _forget_output()  # the reader has seen enough
         return 0
     except InputError as error:
         print(error, file=sys.stderr)
@@ -51,8 +50,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(*filter(None, (getattr(arguments, 'case', None), error)), sep=': ', file=sys.stderr)
         return BAD_INPUT
     except OSError as error:
+        if error.filename is None:
+            _forget_output()
         print(f'{error.filename or "standard output"}: {error.strerror}', file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         return INTERRUPTED
     return status
+
+
+def _forget_output() -> None:
+    """Send what is left of the output nowhere: Python would complain again while closing it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -28,3 +28,13 @@ def replay(arguments: Namespace) -> int:
         published = publish(arguments.profile, rate=arguments.rate, progress=report)
     print(f'{arguments.profile}: {published} messages published')
     return 0
+
+
+def recover(arguments: Namespace) -> int:
+    """Save everything readable of a log whose writer was killed."""
+    from rotorsoil_ros.live.recover import recover as save
+
+    with progress('recovering') as report:
+        saved = save(arguments.broken, arguments.output, progress=report)
+    print(f'{arguments.output}: {saved}')
+    return 0

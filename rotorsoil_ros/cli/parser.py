@@ -66,7 +66,7 @@ def _order(text: str) -> float:
 
 
 def _modes(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 1 <= int(text[:4]) and len(text) <= 3):
+    if not (text.isascii() and text.isdigit() and int(text[:4]) >= 1 and len(text) <= 3):
         raise argparse.ArgumentTypeError(f'must be 1 to 999 modes, got {text!r}')
     return int(text)
 
@@ -88,6 +88,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument('--version', action='version', version=rotorsoil_ros.__version__)
     verbs = top.add_subparsers(metavar='VERB', required=True)
     _add_case_verbs(verbs)
+    _add_import_verbs(verbs)
     _add_live_verbs(verbs)
     return top
 
@@ -178,6 +179,17 @@ def _add_modal_verbs(verbs: _Verbs) -> None:
     _add_output(campbell)
 
 
+def _add_import_verbs(verbs: _Verbs) -> None:
+    ross = _verb(verbs, 'import-ross', 'importing:import_ross',
+                 'write the case of a rotor that ROSS saved as TOML', case=False)
+    ross.add_argument('rotor', metavar='ROTOR.toml', type=Path, help='what Rotor.save wrote')
+    ross.add_argument('-o', '--output', metavar='CASE.yaml', default='-',
+                      help='case file to write; - is standard output (default)')
+    ross.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse,
+                      help='speed range of the case, A to B (default: what the tables of the '
+                           'bearings cover)')
+
+
 def _add_live_verbs(verbs: _Verbs) -> None:
     predict = _verb(verbs, 'predict', 'bags:predict',
                     'answer every speed of a recorded profile, without a ROS graph')
@@ -191,7 +203,65 @@ def _add_live_verbs(verbs: _Verbs) -> None:
     replay.add_argument('profile', metavar='PROFILE', type=Path, help='MCAP file or bag')
     replay.add_argument('--rate', metavar='R', type=_rate, default=1.0,
                         help='speed of replay (default: 1, as recorded)')
+    recover = _verb(verbs, 'recover', 'bags:recover',
+                    'save everything readable of a log whose writer was killed', case=False)
+    recover.add_argument('broken', metavar='BROKEN.mcap', type=Path, help='MCAP file')
+    recover.add_argument('-o', '--output', metavar='FIXED.mcap', type=Path, required=True,
+                         help='file to write; it must not exist')
+    _add_compare(verbs)
     demo = _verb(verbs, 'demo', 'demo:demo',
                  'run up, dwell and coast down a machine before a live node', case=False)
     demo.add_argument('-o', '--output', metavar='DIR', type=Path, default=Path('demo_output'),
                       help='directory for log, recording and plots (default: demo_output)')
+
+
+def _add_compare(verbs: _Verbs) -> None:
+    compare = _verb(verbs, 'compare', 'compare:compare',
+                    'hold a log of measured vibration against its prediction', case=False)
+    add = compare.add_argument
+    add('log', metavar='LOG', type=Path, help='MCAP file or bag with speed and measured topics')
+    add('case', metavar='CASE', type=Path, nargs='?',
+        help='case file (YAML); needed for band, critical speeds and zones, unless the log was '
+             'answered with a case of this package')
+    add('-o', '--output', metavar='DIR', type=Path, default=Path('comparison'),
+        help='directory for tables, pictures and report (default: comparison)')
+    add('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append', default=[],
+        help='override the case file; may be repeated')
+    add('--cache', metavar='DIR', type=Path, help='directory of computed tables')
+    add('--machine', metavar='NAME', help='which machine, if the log tells of several')
+    add('--tolerance-s', metavar='S', type=_positive, default=0.05,
+        help='largest distance of stamps that belong together [s] (default: %(default)s)')
+    add('--slow-roll-rpm', metavar='R', type=_positive,
+        help='speed whose vector is runout and is subtracted [rpm]')
+    add('--noise-um', metavar='A', type=_positive, default=0.0,
+        help='amplitude below which nothing is compared [um] (default: %(default)s)')
+    add('--soil-factor', metavar='F', type=_positive, default=2.0,
+        help='G lies within this factor of the case (default: %(default)s)')
+    add('--margin', metavar='M', type=_positive, default=0.10,
+        help='share by which an amplitude may leave the band (default: %(default)s)')
+    add('--zone-group', type=int, choices=(1, 2), default=2,
+        help='group of ISO 10816-3:2009, 1 above 300 kW (default: %(default)s)')
+    add('--identify-unbalance', action='store_true',
+        help='print the unbalance that explains the run best')
+    add('--identify', metavar='KEY.PATH', action='append', default=[],
+        help='with it, a scalar of the case, as in soil.shear_modulus or '
+             'rotor.bearings.*.stiffness; may be repeated')
+    add('--plane', metavar='DISC', action='append', default=[],
+        help='with it, whose unbalance is unknown (default: of every disc); may be repeated')
+    add('--identify-growth', action='store_true',
+        help='with it, by how much the unbalance grows over the run')
+    add('--identify-runout', action='store_true',
+        help='with it, a constant vector of every channel')
+    add('--with-transients', action='store_true',
+        help='identify from points that are not quasi-static too')
+    add('--write-case', metavar='FILE', type=Path, help='write the case as identified')
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f'must be a number >= 0, got {text!r}')
+    return value

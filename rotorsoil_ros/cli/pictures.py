@@ -1,16 +1,26 @@
 """Every picture of a case, and the figures of the seed paper."""
 
 from argparse import Namespace
+from collections.abc import Iterator
 from importlib.resources import as_file, files
+from itertools import chain
 from pathlib import Path
+import sys
 
+from matplotlib.figure import Figure
 import numpy as np
 
 from rotorsoil_ros.case import cache, models
-from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.modal_plots import modal_figures
 from rotorsoil_ros.case.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
-from rotorsoil_ros.case.plots import all_figures
+from rotorsoil_ros.case.plots import all_figures, main_peaks
+from rotorsoil_ros.case.soil_plots import compliance_figure
+from rotorsoil_ros.case.study_plots import mass_ratios, polar
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.errors import RotorSoilError
+from rotorsoil_ros.physics.response import ResponseTable
 
 
 def plot(arguments: Namespace) -> int:
@@ -21,11 +31,41 @@ def plot(arguments: Namespace) -> int:
         directory = cache.directory(arguments.cache)
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
-        for name, figure in all_figures(case, model, table):
+        for name, figure in chain(
+                all_figures(case, model, table), modal_figures(case, model),
+                _studies(case, model, table), _soil_figures(case, model, directory)):
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)
             print(path)
     return 0
+
+
+def _studies(
+    case: Case, model: CoupledModel, table: ResponseTable,
+) -> Iterator[tuple[str, Figure]]:
+    predictor = table.predictor(case.unbalance)
+    if case.rotor.discs and np.any(case.unbalance):
+        yield 'polar', polar(case, predictor, main_peaks(case, predictor))
+        if case.support.model != 'rigid':
+            yield 'mass_ratios', mass_ratios(case, model)
+
+
+def _soil_figures(
+    case: Case, model: CoupledModel, directory: Path,
+) -> Iterator[tuple[str, Figure]]:
+    """Yield both models of the soil below each block, where the case has a soil."""
+    if case.soil is None or case.support.model not in ('cone', 'infinite_elements'):
+        return
+    for block in model.foundations:
+        try:
+            infinite = models.infinite_element_model(
+                case.soil, block.contact, case.support.geometry, cache=cache.Cache(directory),
+                speed_range=case.speed_range)
+        except RotorSoilError as error:
+            # Cones know soils that infinite elements refuse.
+            print(f'no picture compliance_{block.name}: {error}', file=sys.stderr)
+            continue
+        yield f'compliance_{block.name}', compliance_figure(case.name, block, infinite)
 
 
 def figures(arguments: Namespace) -> int:

@@ -130,5 +130,9 @@ def opened(target: str) -> Iterator[TextIO]:
     if target == '-':
         yield sys.stdout
         return
-    with open(target, 'w', encoding='utf-8') as stream:
-        yield stream
+    try:
+        with open(target, 'w', encoding='utf-8') as stream:
+            yield stream
+    except OSError as error:
+        error.filename = target  # a full disk does not say which file
+        raise

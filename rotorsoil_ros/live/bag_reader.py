@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import io
 from pathlib import Path
+import re
 import struct
 from typing import BinaryIO, TypeAlias
 import zlib
@@ -23,7 +24,7 @@ from rotorsoil_ros.physics.errors import InputError
 
 RECORD_HEADER = struct.Struct('<BQ')
 MESSAGE_HEADER = struct.Struct('<HIQQ')
-LARGEST_RECORD = 1 << 30  # [bytes]; a file that claims more is broken or hostile
+LARGEST_RECORD = 1 << 28  # [bytes]; a file that claims more is broken or hostile
 LAST_STAMP = (1 << 63) - 1
 LOOSE = 1000  # messages without a chunk are handed on in portions of so many
 BROKEN = (McapError, struct.error, zstandard.ZstdError, RuntimeError, UnicodeDecodeError,
@@ -46,7 +47,7 @@ def topics(path: Path) -> dict[str, tuple[str, int]]:
     """Return type and number of messages of every topic in a bag or MCAP file."""
     found: dict[str, tuple[str, int]] = {}
     for file in files(path):
-        with _open(file) as stream:
+        with opened(file) as stream:
             summary = SeekingReader(stream, record_size_limit=LARGEST_RECORD).get_summary()
         if summary is None or summary.statistics is None:
             raise InputError(f'{file}: has no summary of its topics')
@@ -87,11 +88,21 @@ def files(path: Path) -> list[Path]:
     if not path.is_dir():
         raise InputError(f'{path}: no such file or bag directory')
     listed = _listed(path / 'metadata.yaml')
-    found = [path / Path(name).name for name in listed] if listed else sorted(
-        path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
+    found = [path / Path(name).name for name in listed] if listed else files_in(path)
     if not found or any(file.suffix != '.mcap' for file in found):
         raise InputError(f'{path}: holds no MCAP file; other storages must be converted first')
     return found
+
+
+def files_in(bag: Path) -> list[Path]:
+    """Return the MCAP files that lie in a directory, in the order of their numbers."""
+    return sorted(bag.glob('*.mcap'), key=lambda file: (number_in(file.stem), file.name))
+
+
+def number_in(name: str) -> int:
+    """Return the last number in the name of a file of a bag, zero if it has none."""
+    numbers = re.findall(r'_(\d+)', name)
+    return int(numbers[-1][:18]) if numbers else 0
 
 
 def _listed(path: Path) -> list[str]:
@@ -107,7 +118,7 @@ def _listed(path: Path) -> list[str]:
 
 
 @contextmanager
-def _open(file: Path) -> Iterator[BinaryIO]:
+def opened(file: Path) -> Iterator[BinaryIO]:
     """Open an MCAP file that was finished; say in one line what is wrong with one that is not."""
     try:
         with file.open('rb') as stream:
@@ -126,8 +137,8 @@ def _open(file: Path) -> Iterator[BinaryIO]:
 
 def _chunks(file: Path, wanted: Wanted) -> Iterator[list[Entry]]:
     """Read a file chunk by chunk, wanted messages only."""
-    contents = Contents(file, wanted)
-    with _open(file) as stream:
+    contents = Contents(wanted)
+    with opened(file) as stream:
         stream.seek(len(MCAP0_MAGIC))
         while (opcode := contents.read(stream)) not in (Opcode.DATA_END, Opcode.FOOTER):
             if opcode == Opcode.CHUNK or len(contents.entries) >= LOOSE:
@@ -138,9 +149,8 @@ def _chunks(file: Path, wanted: Wanted) -> Iterator[list[Entry]]:
 class Contents:
     """What of a file has been read and not yet taken."""
 
-    def __init__(self, file: Path, wanted: Wanted) -> None:
+    def __init__(self, wanted: Wanted) -> None:
         self.entries: list[Entry] = []
-        self._file = file
         self._wanted = wanted
         self._schemas: dict[int, str] = {0: ''}
         self._sources: dict[int, Source] = {}
@@ -154,37 +164,18 @@ class Contents:
         """Read the next record of the file and return its kind."""
         opcode, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
         if length > LARGEST_RECORD:
-            raise InputError(f'{self._file}: is damaged (a record of {length} bytes)')
+            raise McapError(f'a record of {length} bytes')
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
             self._add(opcode, stream.read(length), 0, length)
         elif opcode == Opcode.CHUNK:
-            self._unpack(Chunk.read(ReadDataStream(io.BytesIO(stream.read(length)))))
+            self._unpack(unpacked(stream.read(length)))
         else:
             stream.seek(length, io.SEEK_CUR)
         return int(opcode)
 
-    def _unpack(self, chunk: Chunk) -> None:
-        body = self._decompressed(chunk)
-        if chunk.uncompressed_crc and zlib.crc32(body) != chunk.uncompressed_crc:
-            raise InputError(f'{self._file}: is damaged (a chunk fails its checksum)')
-        at = 0
-        while at < len(body):
-            opcode, length = RECORD_HEADER.unpack_from(body, at)
-            at += RECORD_HEADER.size
+    def _unpack(self, body: bytes) -> None:
+        for opcode, at, length in inside(body):
             self._add(opcode, body, at, length)
-            at += length
-
-    def _decompressed(self, chunk: Chunk) -> bytes:
-        if chunk.uncompressed_size > LARGEST_RECORD:
-            raise InputError(f'{self._file}: is damaged (a chunk of {chunk.uncompressed_size} B)')
-        match chunk.compression:
-            case '':
-                return chunk.data
-            case 'zstd':
-                return zstandard.decompress(chunk.data, chunk.uncompressed_size)
-            case 'lz4':
-                return bytes(lz4.frame.decompress(chunk.data))
-        raise InputError(f'{self._file}: unknown compression {chunk.compression!r}')
 
     def _add(self, opcode: int, body: bytes, at: int, length: int) -> None:
         """Keep a message that is wanted; learn from a schema or a channel."""
@@ -192,7 +183,7 @@ class Contents:
             channel, _, log_time, _ = MESSAGE_HEADER.unpack_from(body, at)
             source = self._sources.get(channel)
             if source is None or log_time > LAST_STAMP:
-                raise InputError(f'{self._file}: is damaged (channel {channel}, time {log_time})')
+                raise McapError(f'channel {channel}, time {log_time}')
             if source.is_wanted:
                 payload = body[at + MESSAGE_HEADER.size:at + length]
                 self.entries.append((source, log_time, payload))
@@ -204,3 +195,46 @@ class Contents:
             if channel.id not in self._sources:
                 self._sources[channel.id] = Source(
                     channel.topic, self._schemas.get(channel.schema_id, ''), self._wanted)
+
+
+def unpacked(content: bytes) -> bytes:
+    """
+    Return the records in a Chunk record, decompressed and held against their checksum.
+
+    Raises
+    ------
+    McapError, or another of BROKEN
+        If they are damaged, or would not fit into memory.
+
+    """
+    chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
+    size = chunk.uncompressed_size
+    if size > LARGEST_RECORD:
+        raise McapError(f'a chunk of {size} bytes')
+    match chunk.compression:
+        case '':
+            body = chunk.data
+        case 'zstd':
+            # What the frame says of itself would be believed, and that much memory asked for.
+            if zstandard.frame_content_size(chunk.data) not in (-1, size):
+                raise McapError('a chunk of another size than it says')
+            body = zstandard.decompress(chunk.data, size)
+        case 'lz4':
+            body = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, size + 1)
+        case _:
+            raise McapError(f'unknown compression {chunk.compression!r}')
+    if len(body) != size or chunk.uncompressed_crc not in (0, zlib.crc32(body)):
+        raise McapError('a chunk fails its checksum')
+    return bytes(body)
+
+
+def inside(body: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield kind, place and length of every record of an unpacked chunk."""
+    at = 0
+    while at < len(body):
+        opcode, length = RECORD_HEADER.unpack_from(body, at)
+        at += RECORD_HEADER.size
+        if length > len(body) - at:
+            raise McapError('a record that ends outside of its chunk')
+        yield opcode, at, length
+        at += length

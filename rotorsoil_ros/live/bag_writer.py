@@ -1,41 +1,23 @@
 """What does a run leave on the disk? A bag as rosbag2 shapes it, never over an older one."""
 
 from collections import Counter
-from dataclasses import dataclass
+from contextlib import suppress
+import errno
+import fcntl
 import os
 from pathlib import Path
 from types import TracebackType
-from typing import Any
-
-import yaml
 
 import rotorsoil_ros
+from rotorsoil_ros.live import bag_metadata
+from rotorsoil_ros.live.bag_metadata import Contents, FileEntry, offered_qos_text, Topic
 from rotorsoil_ros.live.events import NANOSECONDS
 from rotorsoil_ros.live.interfaces import definition, type_hash
 from rotorsoil_ros.live.mcap_writer import McapWriter
 from rotorsoil_ros.live.messages import Records
 
-METADATA_VERSION = 9  # of rosbag2 in Jazzy
 MEBIBYTE = 1 << 20
-FOREVER = {'sec': 9223372036, 'nsec': 854775807}
-
-
-def offered_qos(*, latched: bool) -> list[dict[str, Any]]:
-    """Return the quality of service with which a topic was offered, as rosbag2 writes it."""
-    return [{
-        'history': 'keep_last', 'depth': 1 if latched else 10, 'reliability': 'reliable',
-        'durability': 'transient_local' if latched else 'volatile',
-        'deadline': dict(FOREVER), 'lifespan': dict(FOREVER), 'liveliness': 'automatic',
-        'liveliness_lease_duration': dict(FOREVER), 'avoid_ros_namespace_conventions': False}]
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """One topic of a log: name, type, and whether its last message is kept for latecomers."""
-
-    name: str
-    type: str
-    latched: bool
+LARGEST_INDEX = 4 * MEBIBYTE  # the index of a file is held in memory until the file is finished
 
 
 class LogFile:
@@ -44,9 +26,13 @@ class LogFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.topics: dict[str, Topic] = {}
-        self._stream = path.open('wb')
+        self._stream = path.open('wb', buffering=0)
+        # Nobody takes the file for that of a dead writer while this one lives.
+        with suppress(OSError):
+            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._writer = McapWriter(
-            self._stream, profile='ros2', library=f'rotorsoil_ros {rotorsoil_ros.__version__}')
+            self._stream, profile='ros2',
+            library=f'{bag_metadata.WRITER} {rotorsoil_ros.__version__}')
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
@@ -67,14 +53,27 @@ class LogFile:
         self._writer.add_messages(channel, records.log_time_ns, records.payloads)
 
     def flush(self) -> None:
-        """Put everything that has come so far onto the disk."""
+        """Put everything that has come so far into the file."""
         self._writer.flush()
 
     def close(self) -> None:
-        """Finish the file; a second time does nothing."""
+        """Finish the file; a second time does nothing, unless the first one failed."""
         if not self._stream.closed:
             self._writer.close()
             self._stream.close()
+
+    def discard(self) -> None:
+        """Leave the file as it is."""
+        self._stream.close()
+
+    def check(self) -> None:
+        """Raise FileNotFoundError if the file is no longer where it was opened."""
+        own = os.fstat(self._stream.fileno())
+        with suppress(FileNotFoundError, NotADirectoryError):
+            there = self.path.stat()
+            if (there.st_ino, there.st_dev) == (own.st_ino, own.st_dev):
+                return
+        raise FileNotFoundError(errno.ENOENT, 'was deleted while it was written', str(self.path))
 
     @property
     def size(self) -> int:
@@ -82,24 +81,39 @@ class LogFile:
         return self._writer.size
 
     @property
+    def index_size(self) -> int:
+        """Bytes of memory that its index takes."""
+        return self._writer.index_size
+
+    @property
     def counts(self) -> Counter[str]:
-        """Messages by topic."""
+        """Messages by topic that have reached the file."""
         return Counter({name: self._writer.counts.get(channel, 0)
                         for name, channel in self._channels.items()})
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """First time and duration of what has reached the disk [ns]."""
+        """First time and duration of what has reached the file [ns]."""
         first, last = self._writer.start_ns, self._writer.end_ns
         return (first, last - first) if last >= first else (0, 0)
+
+    @property
+    def longest_ns(self) -> int:
+        """Time between the first and the last message of the topic that spans most [ns]."""
+        return self._writer.longest_ns
+
+    @property
+    def entry(self) -> FileEntry:
+        """What the bag says of this file."""
+        return FileEntry(self.path.name, *self.span_ns, self.counts.total())
 
     def _announce(self, records: Records) -> int:
         kind = records.type
         if kind not in self._schemas:
             self._schemas[kind] = self._writer.add_schema(kind, 'ros2msg', definition(kind))
-        qos = yaml.safe_dump(offered_qos(latched=records.latched), sort_keys=False)
         channel = self._writer.add_channel(records.topic, self._schemas[kind], {
-            'offered_qos_profiles': qos, 'topic_type_hash': type_hash(kind)})
+            'offered_qos_profiles': offered_qos_text(latched=records.latched),
+            'topic_type_hash': type_hash(kind)})
         self._channels[records.topic] = channel
         self.topics[records.topic] = Topic(records.topic, kind, records.latched)
         return channel
@@ -110,14 +124,22 @@ class BagWriter:
     A bag directory: `<name>/<name>_0.mcap` and `metadata.yaml`.
 
     A new file begins when one exceeds `split_mib` or spans `split_s` of message time; zero
-    never splits.
+    splits only when the index of the file takes too much memory.
     """
 
-    def __init__(self, path: Path, *, split_mib: float = 0.0, split_s: float = 0.0) -> None:
+    def __init__(
+        self, path: Path, *, split_mib: float = 0.0, split_s: float = 0.0,
+        gaps: dict[str, str] | None = None,
+    ) -> None:
         self.path = path
+        self.gaps = gaps or {}
+        self.finished_size = 0
         self._split_size = split_mib * MEBIBYTE
         self._split_ns = split_s * NANOSECONDS
-        self._done: list[LogFile] = []
+        self._done: list[FileEntry] = []
+        self._topics: dict[str, Topic] = {}
+        self._counts: Counter[str] = Counter()
+        self._number = 0
         self._file = self._open()
         self._write_metadata()
 
@@ -127,56 +149,92 @@ class BagWriter:
 
     def flush(self) -> None:
         """Put everything onto the disk; call it every second, whatever the traffic."""
+        self._file.check()
         self._file.flush()
-        if 0 < self._split_size <= self._file.size or 0 < self._split_ns <= self._file.span_ns[1]:
-            self._file.close()
-            self._done.append(self._file)
+        if self._is_full():
+            self._finish_file()
             self._file = self._open()
             self._write_metadata()
 
     def close(self) -> None:
         """Finish the file and say in `metadata.yaml` what the bag holds."""
-        self._file.close()
+        try:
+            self._finish_file()
+            self._write_metadata()
+        finally:
+            self._file.discard()
+
+    def abandon(self) -> None:
+        """Finish after a failure what can be finished, and leave the rest for `resume`."""
+        with suppress(OSError):
+            self._drop_deleted()
+            self._finish_file()
+            self._write_metadata()
+
+    def resume(self, gap: str) -> None:
+        """Begin a new file after a failure; write down what is missing and why."""
+        self._drop_deleted()
+        self._finish_file()
+        self._file = self._open()
+        self.gaps[f'gap_{len(self.gaps) + 1}'] = gap
         self._write_metadata()
 
+    def forget(self, name: str) -> None:
+        """Drop a file that was removed to make room."""
+        self._done = [entry for entry in self._done if entry.name != name]
+        self._write_metadata()
+
+    @property
+    def file(self) -> Path:
+        """The file that is being written."""
+        return self._file.path
+
+    @property
+    def size(self) -> int:
+        """Bytes written to all files."""
+        return self.finished_size + (0 if self._is_closed else self._file.size)
+
+    @property
+    def written(self) -> int:
+        """Messages that have reached the disk."""
+        return self._counts.total() + (0 if self._is_closed else self._file.counts.total())
+
+    def _is_full(self) -> bool:
+        file = self._file
+        return (0 < self._split_size <= file.size or 0 < self._split_ns <= file.longest_ns
+                or file.index_size > LARGEST_INDEX)
+
     def _open(self) -> LogFile:
-        return LogFile(self.path / f'{self.path.name}_{len(self._done)}.mcap')
+        file = LogFile(self.path / f'{self.path.name}_{self._number}.mcap')
+        self._number += 1
+        self._is_closed = False
+        return file
+
+    def _finish_file(self) -> None:
+        """Close the file and keep of it only what the bag says of it."""
+        if not self._is_closed:
+            self._file.close()
+            self._is_closed = True
+            self._done.append(self._file.entry)
+            self._topics |= self._file.topics
+            self._counts += self._file.counts
+            self.finished_size += self._file.size
+
+    def _drop_deleted(self) -> None:
+        """Know nothing of the file any more if it is gone."""
+        if not self._is_closed:
+            try:
+                self._file.check()
+            except FileNotFoundError:
+                self._is_closed = True
+                self._file.discard()
 
     def _write_metadata(self) -> None:
-        files = [*self._done, self._file]
-        text = yaml.safe_dump(
-            {'rosbag2_bagfile_information': metadata(files)}, sort_keys=False)
-        partial = self.path / 'metadata.yaml.tmp'
-        partial.write_text(text, encoding='utf-8')
-        os.replace(partial, self.path / 'metadata.yaml')
-
-
-def metadata(files: list[LogFile]) -> dict[str, Any]:
-    """Return what `metadata.yaml` says of the files of a bag."""
-    topics = {name: topic for file in files for name, topic in file.topics.items()}
-    counts = sum((file.counts for file in files), Counter())
-    spans = [file.span_ns for file in files if file.counts.total()]
-    start = min((first for first, _ in spans), default=0)
-    stop = max((first + duration for first, duration in spans), default=start)
-    return {
-        'version': METADATA_VERSION, 'storage_identifier': 'mcap',
-        'duration': {'nanoseconds': stop - start},
-        'starting_time': {'nanoseconds_since_epoch': start},
-        'message_count': counts.total(),
-        'topics_with_message_count': [
-            {'topic_metadata': {
-                'name': topic.name, 'type': topic.type, 'serialization_format': 'cdr',
-                'offered_qos_profiles': offered_qos(latched=topic.latched),
-                'type_description_hash': type_hash(topic.type)},
-             'message_count': counts[topic.name]} for topic in topics.values()],
-        'compression_format': '', 'compression_mode': '',
-        'relative_file_paths': [file.path.name for file in files],
-        'files': [
-            {'path': file.path.name,
-             'starting_time': {'nanoseconds_since_epoch': file.span_ns[0]},
-             'duration': {'nanoseconds': file.span_ns[1]},
-             'message_count': file.counts.total()} for file in files],
-        'custom_data': None, 'ros_distro': 'jazzy'}
+        files, topics, counts = self._done, self._topics, self._counts
+        if not self._is_closed:
+            files = [*files, self._file.entry]
+            topics, counts = topics | self._file.topics, counts + self._file.counts
+        bag_metadata.write(self.path, Contents(files, topics, counts), self.gaps)
 
 
 def new_directory(directory: Path, name: str) -> Path:

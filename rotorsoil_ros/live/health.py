@@ -4,11 +4,13 @@ from collections import Counter
 import math
 
 from rotorsoil_ros.live.events import Diagnostics, Level, NANOSECONDS
+from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.units import rad_s_to_rpm
 
 GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unresolved')
 FAULTS = (*GAPS, 'malformed', 'velocity_missing')
-COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', 'measured')
+STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
+COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *STAMPS, 'measured')
 
 
 class Health:
@@ -20,6 +22,8 @@ class Health:
         self.counts = Counter(dict.fromkeys(COUNTED, 0))
         self.level = Level.STALE
         self.last_speed = math.nan
+        self.publishers = 1
+        self._last_ns: int | None = None
         self._faults = 0
         self._at_tick = self.counts.copy()
         self._tick_ns: int | None = None
@@ -32,6 +36,15 @@ class Health:
         self.counts[reason] += count
         if reason in FAULTS:
             self._faults += count
+
+    def receive(self, stamp_ns: IntArray, speed: FloatArray) -> None:
+        """Count speeds [rad/s] and look whether their stamps [ns] go forward."""
+        self.last_speed = float(speed[-1])
+        self.counts['received'] += len(speed)
+        for stamp in stamp_ns.tolist():
+            if self._last_ns is not None and stamp <= self._last_ns:
+                self.counts[STAMPS[stamp < self._last_ns]] += 1
+            self._last_ns = stamp
 
     @property
     def has_news(self) -> bool:
@@ -58,7 +71,8 @@ class Health:
         if not self.counts['received'] or self._silent_s > stale_after_s:
             self.level = Level.STALE
         else:
-            self.level = Level.WARN if self._faults else Level.OK
+            is_well = not self._faults and self.publishers < 2
+            self.level = Level.OK if is_well else Level.WARN
         report = self._report(now_ns)
         self._tick_ns, self._at_tick, self._faults = now_ns, self.counts.copy(), 0
         return report
@@ -72,6 +86,7 @@ class Health:
             'speed_rad_s': self.last_speed, 'speed_rpm': rad_s_to_rpm(self.last_speed),
             'table_from_rad_s': lowest, 'table_to_rad_s': highest,
             'rate_hz': self._rate_hz, 'silent_s': self._silent_s,
+            'publishers': self.publishers,
             **{reason: self.counts[reason] for reason in COUNTED}}
         return Diagnostics(self.machine, now_ns, self.level, self._summary(), values)
 
@@ -84,6 +99,8 @@ class Health:
         if self.level is Level.OK:
             rate = f', {self._rate_hz:.1f} per second' if self._rate_hz else ''
             return f'every speed is answered{rate}'
+        if self.publishers > 1 and not any(self._since_tick(reason) for reason in FAULTS):
+            return f'{self.publishers} publishers tell the speed'
         faults = {reason: self._since_tick(reason) for reason in FAULTS}
         told = [f'{count} {reason.replace("_", " ")}' for reason, count in faults.items() if count]
         return 'without an answer: ' + ', '.join(told)

@@ -40,21 +40,28 @@ LAST_STAMP = (1 << 64) - 1
 
 
 class McapWriter:
-    """Write messages in the order in which they come, chunked, compressed, indexed, checked."""
+    """
+    Write messages in the order in which they come, chunked, compressed, indexed, checked.
+
+    The stream must not buffer: a write that fails leaves it as it was before, so that it can
+    be closed. What did not reach it is not counted.
+    """
 
     def __init__(self, stream: BinaryIO, *, profile: str, library: str) -> None:
-        self.size = 0
+        self.size = self.index_size = 0  # bytes
         self.counts: dict[int, int] = defaultdict(int)
         self.start_ns, self.end_ns = LAST_STAMP, 0
+        self.longest_ns = 0
+        self._first_ns: dict[int, int] = {}
         self._stream = stream
         self._crc = 0
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk_indexes: list[ChunkIndex] = []
+        self._sequences: dict[int, int] = defaultdict(int)
+        self._chunk_indexes: list[bytes] = []
         self._compressor = zstandard.ZstdCompressor(level=ZSTD_LEVEL)
         self._begin_chunk()
         self._write(MCAP0_MAGIC + _bytes(Header(profile, library)))
-        stream.flush()
 
     def add_schema(self, name: str, encoding: str, definition: str) -> int:
         """Say how messages of a type are read; return the number of the schema."""
@@ -77,7 +84,7 @@ class McapWriter:
         self, channel: int, log_time_ns: Sequence[int], payloads: Sequence[bytes],
     ) -> None:
         """Append messages of one channel."""
-        index, sequence = self._index[channel], self.counts[channel]
+        index, sequence = self._index[channel], self._sequences[channel]
         append, pack = self._parts.append, MESSAGE_HEADER.pack
         for stamp, payload in zip(log_time_ns, payloads, strict=True):
             index.append((stamp, self._filled))
@@ -86,30 +93,29 @@ class McapWriter:
             append(payload)
             self._filled += length + 9
             sequence += 1
-        self.counts[channel] = sequence
+        self._sequences[channel] = sequence
         if self._filled > CHUNK_SIZE:
             self._end_chunk()
 
     def flush(self) -> None:
         """Put everything that has come so far into the file."""
         self._end_chunk()
-        self._stream.flush()
 
     def close(self) -> None:
-        """Write the indexes; the stream stays open."""
+        """Write the indexes; the stream stays open, and what has failed may be tried again."""
         self._end_chunk()
-        self._write(_bytes(DataEnd(self._crc)))
-        summary, start = io.BytesIO(), self.size
-        groups: list[Sequence[McapRecord]] = [
-            self._schemas, self._channels, [self._statistics()], self._chunk_indexes]
+        end = _bytes(DataEnd(self._crc))
+        summary, start = io.BytesIO(), self.size + len(end)
+        groups = [[_bytes(schema) for schema in self._schemas],
+                  [_bytes(channel) for channel in self._channels],
+                  [_bytes(self._statistics())], self._chunk_indexes]
         offsets = [_write_group(group, summary, start) for group in groups if group]
         offsets_start = start + summary.tell()
         summary.write(b''.join(_bytes(offset) for offset in offsets))
         body = summary.getvalue()
         crc = zlib.crc32(FOOTER_BODY.pack(Opcode.FOOTER, 20, start, offsets_start),
                          zlib.crc32(body))
-        self._write(body + _bytes(Footer(start, offsets_start, crc)) + MCAP0_MAGIC)
-        self._stream.flush()
+        self._write(end + body + _bytes(Footer(start, offsets_start, crc)) + MCAP0_MAGIC)
 
     def _begin_chunk(self) -> None:
         self._parts: list[bytes] = []
@@ -124,29 +130,49 @@ class McapWriter:
         """Compress what has come and write it with the index of its messages."""
         if not any(self._index.values()):
             return
-        body = b''.join(self._parts)
-        data = self._compressor.compress(body)
-        stamps = [stamp for entries in self._index.values() for stamp, _ in entries]
+        body, index = b''.join(self._parts), self._index
+        self._begin_chunk()
+        stamps = [stamp for entries in index.values() for stamp, _ in entries]
         times = {'message_start_time': min(stamps), 'message_end_time': max(stamps)}
-        chunk_start = self.size
-        self._write(_bytes(Chunk(
+        data = self._compressor.compress(body)
+        chunk = _bytes(Chunk(
             compression='zstd', data=data, uncompressed_crc=zlib.crc32(body),
-            uncompressed_size=len(body), **times)))
-        index_start, offsets = self.size, {}
-        for channel, entries in self._index.items():
-            offsets[channel] = self.size
-            self._write(_message_index(channel, entries))
-        self._chunk_indexes.append(ChunkIndex(
-            chunk_length=index_start - chunk_start, chunk_start_offset=chunk_start,
-            compression='zstd', compressed_size=len(data), uncompressed_size=len(body),
-            message_index_length=self.size - index_start, message_index_offsets=offsets,
+            uncompressed_size=len(body), **times))
+        indexes, offsets, at = [chunk], {}, self.size + len(chunk)
+        for channel, entries in index.items():
+            offsets[channel] = at
+            indexes.append(_message_index(channel, entries))
+            at += len(indexes[-1])
+        entry = _bytes(ChunkIndex(
+            chunk_length=len(chunk), chunk_start_offset=self.size, compression='zstd',
+            compressed_size=len(data), uncompressed_size=len(body),
+            message_index_length=at - self.size - len(chunk), message_index_offsets=offsets,
             **times))
+        self._write(b''.join(indexes))
+        self._count(entry, index, times)
+
+    def _count(
+        self, entry: bytes, index: Mapping[int, list[tuple[int, int]]], times: Mapping[str, int],
+    ) -> None:
+        """Take note of a chunk that has reached the file."""
+        self._chunk_indexes.append(entry)
+        self.index_size += len(entry)
+        for channel, entries in index.items():
+            self.counts[channel] += len(entries)
+            first = self._first_ns.setdefault(channel, entries[0][0])
+            self.longest_ns = max(self.longest_ns, entries[-1][0] - first)
         self.start_ns = min(self.start_ns, times['message_start_time'])
         self.end_ns = max(self.end_ns, times['message_end_time'])
-        self._begin_chunk()
 
     def _write(self, data: bytes) -> None:
-        self._stream.write(data)
+        """Append all of it or nothing."""
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._stream.write(rest):]
+        except OSError:
+            self._stream.seek(self._stream.truncate(self.size))
+            raise
         self._crc = zlib.crc32(data, self._crc)
         self.size += len(data)
 
@@ -171,11 +197,8 @@ def _message_index(channel: int, entries: list[tuple[int, int]]) -> bytes:
     return INDEX_HEADER.pack(Opcode.MESSAGE_INDEX, len(body) + 6, channel, len(body)) + body
 
 
-def _write_group(
-    group: Sequence[McapRecord], summary: io.BytesIO, start: int,
-) -> SummaryOffset:
+def _write_group(records: Sequence[bytes], summary: io.BytesIO, start: int) -> SummaryOffset:
     """Write records of one kind into the summary; return where they are."""
-    records = [_bytes(record) for record in group]
     before = summary.tell()
     summary.write(b''.join(records))
     return SummaryOffset(records[0][0], start + before, summary.tell() - before)

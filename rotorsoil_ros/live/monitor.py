@@ -40,8 +40,7 @@ class Monitor:
         """Answer speeds [rad/s] and their stamps [ns], both of shape (n,)."""
         if not len(speed):
             return
-        self.health.last_speed = float(speed[-1])
-        self.health.note('received', len(speed))
+        self.health.receive(stamp_ns, speed)
         try:
             prediction = self._predictor.predict(speed)
             self.health.note('answered', len(speed))
@@ -50,6 +49,14 @@ class Monitor:
         self._emit(Predicted(self.machine, stamp_ns, prediction))
         if self.health.has_news:
             self._emit(self.health.announce(int(stamp_ns[-1])))
+
+    def take_table(
+        self, table: ResponseTable, unbalance: ComplexArray, *, sinks: Sequence[Sink],
+    ) -> None:
+        """Answer from another table, from the next speed on."""
+        self._predictor = table.predictor(unbalance)
+        self.table, self._sinks = table, tuple(sinks)
+        self.health.speed_range = table.speed_range
 
     def on_measured(self, measured: Measured) -> None:
         """Hand on what a measuring system says about this machine."""

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 import gc
-from pathlib import Path
 import signal
 import traceback
 from types import FrameType, TracebackType
@@ -14,14 +13,27 @@ import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import (
+    LifecycleNode,
+    LifecyclePublisher,
+    LifecycleState,
+    TransitionCallbackReturn,
+)
 from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from rotorsoil_ros.live.loading import load_all
 from rotorsoil_ros.live.machine import Machine
-from rotorsoil_ros.live.messages import DIAGNOSTICS_TOPIC, NODE_NAME
+from rotorsoil_ros.live.messages import (
+    diagnostic_array,
+    DIAGNOSTICS,
+    DIAGNOSTICS_TOPIC,
+    NODE_NAME,
+    Records,
+)
 from rotorsoil_ros.live.parameters import Settings
 from rotorsoil_ros.live.run_log import LogSettings, RunLog
 from rotorsoil_ros.live.watch import OUTPUT, Watch
@@ -45,6 +57,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self.settings = Settings(self)
         self._watches: list[Watch] = []
         self._log: RunLog | None = None
+        self._diagnostics: LifecyclePublisher | None = None
         self._held = ExitStack()
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -111,7 +124,9 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         for name, machine in machines.items():
             held.callback(settings.forget_unbalance, name)
             settings.declare_unbalance(name, machine.table.planes, machine.case.unbalance)
-        log = RunLog(self._log_settings(), machines, tell=self.get_logger().error)
+        logger = self.get_logger()
+        log = RunLog(
+            self._log_settings(), machines, tell=logger.info, complain=logger.error)
         held.callback(log.close)
         diagnostics = self.create_lifecycle_publisher(DiagnosticArray, DIAGNOSTICS_TOPIC, OUTPUT)
         held.callback(self.destroy_lifecycle_publisher, diagnostics)
@@ -122,32 +137,29 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         timer = self.create_timer(
             PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         held.callback(self.destroy_timer, timer)
-        self._log = log
+        self._log, self._diagnostics = log, diagnostics
         settings.is_locked = True
         where = f', log {log.path}' if log.path else ''
         self.get_logger().info(f'watching {", ".join(machines)}{where}')
 
     def _load(self) -> dict[str, Machine]:
         """Load every machine, each case file once."""
-        by_file: dict[Path, Machine] = {}
-        machines = {}
-        for name in self.settings.machines:
-            file = self.settings.case_file(name)
-            if file not in by_file:
-                by_file[file] = Machine.load(file, cache_directory=self.settings.cache)
-            machines[name] = by_file[file]
-        return machines
+        files = {name: self.settings.case_file(name) for name in self.settings.machines}
+        by_file = load_all(files.values(), cache_directory=self.settings.cache,
+                           tell=self.get_logger().info)
+        return {name: by_file[file] for name, file in files.items()}
 
     def _forget(self) -> None:
         self.settings.is_locked = False
-        self._watches, self._log = [], None
+        self._watches, self._log, self._diagnostics = [], None, None
 
     def _log_settings(self) -> LogSettings:
         value = self.settings.value
         return LogSettings(
             directory=value('log.directory'), name=value('log.name'), mcap=value('log.mcap'),
             rerun=value('log.rerun'), rerun_url=value('log.rerun_url'),
-            split_mib=value('log.split_mib'), split_s=value('log.split_s'))
+            split_mib=value('log.split_mib'), split_s=value('log.split_s'),
+            budget_mib=value('log.budget_mib'))
 
     def _tick(self) -> None:
         """Once a second of wall time: health to the graph, logs to the disk."""
@@ -156,9 +168,19 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
             watch.tick(self._now_ns(), stale_after_s=stale_after_s)
         if self._log is not None:
             self._log.flush()
+            self._report_log(self._log)
+
+    def _report_log(self, log: RunLog) -> None:
+        """Say on /diagnostics, and so in the log itself, how logging goes."""
+        report = log.report(self._now_ns())
+        if report is not None and self._diagnostics is not None and self._diagnostics.is_activated:
+            payload = serialize_message(diagnostic_array(report))
+            self._diagnostics.publish(payload)
+            log.write(Records(
+                self._diagnostics.topic_name, DIAGNOSTICS, [report.stamp_ns], [payload]))
 
     def _take_parameters(self, parameters: list[Parameter]) -> None:
-        for watch in self._watches:
+        for watch in () if self.settings.is_changing else self._watches:
             own = f'{watch.name}.unbalance.'
             if any(parameter.name.startswith(own) for parameter in parameters):
                 watch.take_unbalance(self._now_ns())

@@ -134,10 +134,14 @@ OWN = {
         '', 'Address of a rerun viewer to show the run live, such as '
         'rerun+http://127.0.0.1:9876/proxy; empty: none.'),
     'log.split_mib': quantity(
-        0.0, 'Size at which a new MCAP file begins, zero: never', 'MiB', span=(0.0, 1e6)),
+        0.0, 'Size at which a new MCAP file begins, zero: when its index takes 4 MiB of memory',
+        'MiB', span=(0.0, 1e6)),
     'log.split_s': quantity(
-        0.0, 'Message time after which a new MCAP file begins, zero: never', 's',
+        0.0, 'Message time after which a new MCAP file begins, zero: as log.split_mib', 's',
         span=(0.0, 1e7)),
+    'log.budget_mib': quantity(
+        0.0, 'Disk space for all logs of this name in the directory; the oldest make room for '
+        'new ones, zero: they never do', 'MiB', span=(0.0, 1e9)),
 }
 OF_MACHINE = {
     'case': Setting('', 'Case file of the machine (YAML).'),
@@ -163,7 +167,7 @@ class Settings:
     """The parameters of one node: declared, read, and guarded against nonsense."""
 
     def __init__(self, node: Node) -> None:
-        self.is_locked = False
+        self.is_locked = self.is_changing = False
         self._node = node
         self._known: dict[str, Setting] = {}
         self._of_case: dict[str, complex] = {}
@@ -227,6 +231,22 @@ class Settings:
             del self._known[name]
             if self._node.has_parameter(name):  # one that was refused never came into being
                 self._node.undeclare_parameter(name)
+
+    def renew_unbalance(
+        self, machine: str, discs: Sequence[str], unbalance: ComplexArray,
+    ) -> None:
+        """Take the unbalance of another case; what somebody has set stays set."""
+        own = f'{machine}.unbalance.'
+        kept = [Parameter(name, value=self.value(name)) for name, setting in self._known.items()
+                if name.startswith(own) and self.value(name) != setting.default]
+        self.is_changing = True
+        try:
+            self.forget_unbalance(machine)
+            self.declare_unbalance(machine, discs, unbalance)
+            self._node.set_parameters(
+                [parameter for parameter in kept if parameter.name in self._known])
+        finally:
+            self.is_changing = False
 
     def unbalance(self, machine: str, discs: Sequence[str]) -> ComplexArray:
         """Return moment * exp(i phase) of every disc, (discs,) [kg m]."""

@@ -9,10 +9,13 @@ import socket
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from rotorsoil_ros.live.bag_writer import BagWriter, new_directory
-from rotorsoil_ros.live.events import Event
+from rotorsoil_ros.live.aside import Aside
+from rotorsoil_ros.live.bag_writer import new_directory
+from rotorsoil_ros.live.events import Diagnostics, Event
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Records
+from rotorsoil_ros.live.recorder import Recorder
+from rotorsoil_ros.live.shelf import Recovery
 from rotorsoil_ros.physics.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,6 +23,10 @@ if TYPE_CHECKING:
 
 RERUN_PORT = 9876
 KNOCK_S = 0.2
+HTTP2_FRAME = 9  # bytes of a header; the one of empty settings is a whole frame
+HTTP2_HELLO = b'PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n' + b'\0\0\0\4\0\0\0\0\0'
+
+Tell = Callable[[str], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,38 +40,41 @@ class LogSettings:
     rerun_url: str
     split_mib: float
     split_s: float
+    budget_mib: float = 0.0
 
 
 class RunLog:
     """
     The bag and the recording of one run.
 
-    A disk that fails ends the log with one message; it never ends the node.
+    Neither a disk that fails nor a viewer that hangs ever ends the node.
     """
 
     def __init__(
-        self, settings: LogSettings, machines: Mapping[str, Machine], *,
-        tell: Callable[[str], object],
+        self, settings: LogSettings, machines: Mapping[str, Machine], *, tell: Tell,
+        complain: Tell,
     ) -> None:
         self.path: Path | None = None
-        self._tell = tell
-        self._bag: BagWriter | None = None
-        self._viewer: RerunSink | None = None
+        self._complain = complain
+        self._recorder: Recorder | None = None
+        self._recovery: Recovery | None = None
+        self._viewer: Aside | None = None
         if settings.directory and (settings.mcap or settings.rerun):
-            self.path = new_directory(Path(settings.directory).expanduser(), settings.name)
+            directory = Path(settings.directory).expanduser()
+            self.path = new_directory(directory, settings.name)
+            self._recovery = Recovery(directory, tell=tell, complain=complain)
         if self.path and settings.mcap:
-            self._bag = BagWriter(
-                self.path, split_mib=settings.split_mib, split_s=settings.split_s)
+            self._recorder = Recorder(
+                self.path, split_mib=settings.split_mib, split_s=settings.split_s,
+                budget_mib=settings.budget_mib, tell=tell,
+                complain=complain)
         if (self.path and settings.rerun) or settings.rerun_url:
             self._viewer = self._open_viewer(settings, machines)
 
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
-        if self._bag is not None:
-            try:
-                self._bag.write(records)
-            except OSError as error:
-                self._give_up(error)
+        if self._recorder is not None:
+            self._recorder.write(records)
 
     def show(self, event: Event) -> None:
         """Show an event in the viewer."""
@@ -75,52 +85,57 @@ class RunLog:
         """Put everything onto the disk; called once a second."""
         if self._viewer is not None:
             self._viewer.flush()
-        if self._bag is not None:
-            try:
-                self._bag.flush()
-            except OSError as error:
-                self._give_up(error)
+        if self._recorder is not None:
+            self._recorder.flush()
+        if self._recovery is not None:
+            self._recovery.step()
+
+    def report(self, now_ns: int) -> Diagnostics | None:
+        """Tell how logging goes, if anything is logged."""
+        return self._recorder.report(now_ns) if self._recorder is not None else None
 
     def close(self) -> None:
         """Finish bag and recording."""
         viewer, self._viewer = self._viewer, None
+        recorder, self._recorder = self._recorder, None
+        recovery, self._recovery = self._recovery, None
+        if recorder is not None:
+            recorder.close()
+        if recovery is not None:
+            recovery.close()
         if viewer is not None:
             viewer.close()
-        bag, self._bag = self._bag, None
-        if bag is not None:
-            try:
-                bag.close()
-            except OSError as error:
-                self._tell(f'log {bag.path} could not be finished: {error.strerror}')
-
-    def _give_up(self, error: OSError) -> None:
-        bag, self._bag = self._bag, None
-        if bag is not None:
-            self._tell(f'log {bag.path} failed and ends here: {error.strerror}')
 
     def _open_viewer(
         self, settings: LogSettings, machines: Mapping[str, Machine],
-    ) -> 'RerunSink | None':
+    ) -> Aside | None:
         recording = self.path / f'{self.path.name}.rrd' if self.path and settings.rerun else None
         url = settings.rerun_url
         if url and not listens(url):
-            self._tell(f'nobody listens at {url}: the run is not shown live')
+            self._complain(f'nobody listens at {url}: the run is not shown live')
             url = ''
         if recording is None and not url:
             return None
         try:
-            return open_viewer(recording, machines, url=url)
+            viewer = open_viewer(recording, machines, url=url)
         except InputError as error:
-            self._tell(str(error))
+            self._complain(str(error))
             return None
+        return Aside(viewer.show, viewer.close, complain=self._complain)
 
 
 def listens(url: str) -> bool:
-    """Return whether a viewer listens; rerun would wait for one that does not, for seconds."""
+    """
+    Return whether a viewer listens and answers; rerun would wait forever for one that does not.
+
+    It speaks gRPC, and so HTTP/2, in which a server says its settings at once.
+    """
     address = urlsplit(url)
     try:
-        with socket.create_connection((address.hostname, address.port or RERUN_PORT), KNOCK_S):
-            return True
+        with socket.create_connection(
+                (address.hostname, address.port or RERUN_PORT), KNOCK_S) as line:
+            line.sendall(HTTP2_HELLO)
+            return len(line.recv(HTTP2_FRAME)) > 0
     except (OSError, ValueError):
         return False
 

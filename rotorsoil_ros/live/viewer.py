@@ -1,7 +1,7 @@
 """What does an engineer see? Trends and the vibrating machine, as a recording for rerun."""
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 
@@ -63,6 +63,12 @@ class RerunSink:
                 self._views[event.machine].measured.append(event)
             case Diagnostics():
                 self._views[event.machine].diagnostics.append(event)
+
+    def show(self, events: Iterable[Event]) -> None:
+        """Collect events and send them."""
+        for event in events:
+            self(event)
+        self.flush()
 
     def flush(self) -> None:
         """Send what was collected."""

@@ -8,7 +8,16 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
-from rotorsoil_ros.live.inlets import inlet, MeasuredInlet, SpeedInlet, TOPICS
+from rotorsoil_ros.case import config
+from rotorsoil_ros.live.events import Sink
+from rotorsoil_ros.live.inlets import (
+    inlet,
+    MeasuredInlet,
+    SPEED_TOPICS,
+    SpeedInlet,
+    TOPICS,
+)
+from rotorsoil_ros.live.loading import reload
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import (
     Encoder,
@@ -20,6 +29,7 @@ from rotorsoil_ros.live.messages import (
 )
 from rotorsoil_ros.live.monitor import Monitor
 from rotorsoil_ros.live.parameters import Settings
+from rotorsoil_ros.live.reloading import Reloader
 from rotorsoil_ros.live.run_log import RunLog
 
 TYPES = {JOINT_STATE: JointState, FLOAT64: Float64}
@@ -46,11 +56,15 @@ class Watch:
         self._machine = machine
         self._settings = settings
         self._subscriptions: list[Any] = []
-        topics = self._publish(diagnostics)
-        encoder = Encoder(machine.table.channels, topics)
-        self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=[
-            Messenger(encoder, [self._send, log.write]), log.show])
+        self._log = log
+        self._topics = self._publish(diagnostics)
+        self._shown_channels = machine.table.channels
+        self._rivals: tuple[str, ...] = ()
+        self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks())
+        self._speed_topics: list[str] = []
         self._subscribe(log)
+        self._reloader = Reloader(
+            node, name, check=self._check, load=self._load, take=self.take_machine)
 
     def begin(self, now_ns: int) -> None:
         """Answer from now on."""
@@ -60,6 +74,7 @@ class Watch:
     def tick(self, now_ns: int, *, stale_after_s: float) -> None:
         """Report the health of the machine."""
         if self.is_active:
+            self._look_for_rivals()
             self.monitor.tick(now_ns, stale_after_s=stale_after_s)
 
     def take_unbalance(self, now_ns: int) -> None:
@@ -68,13 +83,56 @@ class Watch:
         if self.is_active:
             self.monitor.describe(now_ns, self._description())
 
+    def take_machine(self, machine: Machine) -> str:
+        """Answer from another case, from the next speed on; return what to say of it."""
+        self._machine = machine
+        self._settings.renew_unbalance(self.name, machine.table.planes, machine.case.unbalance)
+        self.monitor.take_table(machine.table, self._unbalance(), sinks=self._sinks())
+        if self.is_active:
+            self.monitor.describe(
+                self._node.get_clock().now().nanoseconds, self._description())
+        shown = '' if self._is_shown else '; its channels are others: no longer shown by rerun'
+        return f'{self.name}: reloaded {machine.case.path}{shown}'
+
     def destroy(self) -> None:
         """Leave the graph."""
         self.is_active = False
+        self._reloader.destroy()
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         for publisher in self._own_publishers:
             self._node.destroy_lifecycle_publisher(publisher)
+
+    @property
+    def _is_shown(self) -> bool:
+        """Whether the viewer, which was opened with the first case, knows the channels."""
+        return self._machine.table.channels == self._shown_channels
+
+    def _sinks(self) -> list[Sink]:
+        encoder = Encoder(self._machine.table.channels, self._topics)
+        messenger = Messenger(encoder, [self._send, self._log.write])
+        return [messenger, self._log.show] if self._is_shown else [messenger]
+
+    def _check(self) -> None:
+        config.load(self._settings.case_file(self.name))
+
+    def _load(self) -> Machine:
+        return reload(self._settings.case_file(self.name), cache_directory=self._settings.cache)
+
+    def _look_for_rivals(self) -> None:
+        """Count who tells the speed; name them when they are several."""
+        count = self._node.count_publishers
+        self.monitor.health.publishers = sum(count(topic) for topic in self._speed_topics)
+        names: tuple[str, ...] = ()
+        if self.monitor.health.publishers > 1:
+            names = tuple(sorted(
+                f'{info.node_namespace.rstrip("/")}/{info.node_name} on {topic}'
+                for topic in self._speed_topics
+                for info in self._node.get_publishers_info_by_topic(topic)))
+            if names != self._rivals:
+                self._node.get_logger().warning(
+                    f'{self.name}: more than one publisher tells its speed: {", ".join(names)}')
+        self._rivals = names
 
     def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
         """Create the publishers; return the names that their topics have after remapping."""
@@ -97,6 +155,8 @@ class Watch:
             topic = self._node.resolve_topic_name(f'{self.name}/{name}')
             taken_in = inlet(name, topic, self.monitor, rotor_joint=joint, log=log.write)
             receive = self._receive_bare if kind == FLOAT64 else self._receive_stamped
+            if name in SPEED_TOPICS:
+                self._speed_topics.append(topic)
             self._subscriptions.append(self._node.create_subscription(
                 TYPES[kind], topic, partial(receive, taken_in), profile, raw=True))
 

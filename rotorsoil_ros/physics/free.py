@@ -149,10 +149,10 @@ class FreeVibration:
         Return A and B of a linear eigenproblem A y = w B y with nearly the same eigenvalues.
 
         Fast rotor modes answer the bearings statically and a motion of the housings with their
-        mass. The compliance becomes constant + left (w - poles)^-1 right with its states as
-        unknowns.
+        gyroscopic couple and their mass. The compliance becomes constant + left
+        (w - poles)^-1 right with its states as unknowns.
         """
-        slow, static, second = self._slow
+        slow, static, first, second = self._slow
         inverse, orbits = self._pick(slow)
         length, ports, modes = orbits.shape
         own = len(self.mass)
@@ -176,6 +176,7 @@ class FreeVibration:
         a[:, motion, soil] = -soil_states.left
         a[:, load, force] = a[:, load, gap] = -self.rows.T
         a[:, load, load] = np.eye(own)
+        b[:, load, motion] = self.rows.T @ first @ self.rows
         b[:, load, rate] = middle * (self.mass + self.rows.T @ second @ self.rows)
         a[:, soil, load], a[:, soil, soil] = soil_states.right, np.diag(soil_states.poles)
         b[:, soil, soil] = np.eye(len(soil_states.poles))
@@ -185,17 +186,17 @@ class FreeVibration:
         return a, b
 
     @cached_property
-    def _slow(self) -> tuple[IntArray, ComplexArray, ComplexArray]:
-        """Modes that are slow in either sense, (n, 2 k), and what all others do, (n, 2 b, 2 b)."""
+    def _slow(self) -> tuple[IntArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Modes that are slow in either sense, (n, 2 k), and what others do, (n, 2 b, 2 b)."""
         inverse, _ = self._modes
         count, ports = self.resonant.shape[1], len(self.rows)
         order = np.argsort(-inverse, axis=1)
         slow = np.concatenate([self.resonant, order[:, order.shape[1] - count:]], axis=1)
         others = np.ones_like(inverse)
         np.put_along_axis(others, slow, 0.0, axis=1)
-        moments = np.stack([others, others * inverse**2], axis=1) @ self._residues
-        static, second = moments.reshape(-1, 2, ports, ports).transpose(1, 0, 2, 3)
-        return slow, static, second
+        powers = others[:, None] * inverse[:, None] ** np.arange(3)[:, None]
+        moments = (powers @ self._residues).reshape(-1, 3, ports, ports)
+        return slow, moments[:, 0], moments[:, 1], moments[:, 2]
 
     def guesses(self, count: int) -> tuple[ComplexArray, ComplexArray]:
         """

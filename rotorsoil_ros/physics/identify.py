@@ -15,6 +15,14 @@ WORST_CONDITION = 30.0
 # A run that leaves more than this share of the prior's spread has not told anything.
 UNINFORMED = 0.7
 
+# A model that leaves more than half of the measured power unexplained has identified nothing.
+LEAST_EXPLAINED = 0.5
+
+# Before the fit each scalar in turn is tried at so many values within so many standard deviations
+# of the prior, twice over: away from the solution resonances do not overlap, and no slope leads
+# from one to the other.
+_TRIALS, _REACH, _ROUNDS = 41, 4.0, 2
+
 
 @dataclass(frozen=True)
 class Unbalance:
@@ -132,7 +140,7 @@ def identify(
     Raises
     ------
     NotSolvedError
-        If the run cannot tell a scalar, or the planes apart.
+        If the run cannot tell a scalar, or the planes apart, or is not explained at all.
 
     References
     ----------
@@ -156,10 +164,13 @@ def identify(
 
     # The first fit, nearly without a prior, tells the noise that the second weighs it with.
     size = np.sqrt(np.mean(projected(np.zeros(len(names))) ** 2))
-    logs = fit(1e-3 * size, np.zeros(len(names)))
+    logs = fit(1e-3 * size, _best_start(projected, len(names), prior_deviation))
     noise = max(float(np.sqrt(np.mean(projected(logs) ** 2))), 1e-9 * size)
     logs = fit(noise, logs)
     unbalance = identify_unbalance(respond(np.exp(logs)), measured)
+    if unbalance.explained < LEAST_EXPLAINED:
+        raise NotSolvedError(f'no value of {", ".join(names)} explains the run: the best leaves '
+                             f'{100.0 * (1.0 - unbalance.explained):.0f} % of its power')
     covariance = _covariance(respond, measured, logs, unbalance.moment, noise=noise,
                              prior_deviation=prior_deviation)
     deviation = np.sqrt(np.diagonal(covariance))
@@ -169,6 +180,20 @@ def identify(
                                  f'{left:.2g}, before the run {prior_deviation:.2g}')
     return Identified(tuple(names), np.exp(logs), deviation[:len(names)],
                       covariance / np.outer(deviation, deviation), unbalance)
+
+
+def _best_start(
+    projected: Callable[[FloatArray], FloatArray], count: int, prior_deviation: float,
+) -> FloatArray:
+    """Return the best of some logarithms, tried one scalar at a time."""
+    trials = prior_deviation * np.linspace(-_REACH, _REACH, _TRIALS)
+    logs = np.zeros(count)
+    for index in list(range(count)) * (_ROUNDS if count > 1 else 1):
+        tried = np.tile(logs, (_TRIALS, 1))
+        tried[:, index] = trials
+        left = [np.sum(projected(each) ** 2) for each in tried]
+        logs = tried[int(np.argmin(left))]
+    return logs
 
 
 def _weighted(

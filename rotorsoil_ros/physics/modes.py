@@ -3,27 +3,34 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+import itertools
 import math
 
 import numpy as np
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import linear_sum_assignment
 
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.physics.spectrum import Spectrum, SpectrumSolver
 
-# Speeds at which the search for criticals begins.
+# Speeds at which the search for criticals begins, and up to how many it looks closer.
 _FIRST_SPEEDS = 41
-
 _MOST_SPEEDS = 400
+
+# A mode continues a curve if its shape is more alike than its frequency is apart by this much.
+_ALIKE = 0.1
 
 # Modes that cross omega = Omega in the range lie below this many times its end.
 _ABOVE = 1.1
 _ALL = 10**6
 
-# A critical speed is found to this share of itself.
+# A rotor that moves so much less than its blocks stays still.
+_STILL = 1e-9
+
+# A critical speed is found to this share of itself, or what round-off leaves after so many steps.
 _FOUND = 1e-12
+_STEPS = 40
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,8 @@ class CriticalSpeed:
     damping_ratio : float
         Of the mode [-].
     deflection : (k, 2) complex array
-        Its shape over (x, z) of the rotor's nodes, the largest amplitude being one.
+        Its shape over (x, z) of the rotor's nodes, the largest amplitude being one; where the
+        rotor stays still, that of the support is.
     support : (s,) complex array
         Motion of the support in the same shape, over (x, y, z, rx, ry, rz) of each block, then
         the deflections of pedestals.
@@ -186,12 +194,12 @@ def critical_speeds(
     while True:
         solver, found = solver.refined(speed, _ALL)
         branch = _follow(found)
-        closer = np.setdiff1d(_touching(speed, found, branch), speed)
+        closer = np.setdiff1d(np.concatenate([
+            _touching(speed, found, branch), _torn(speed, found, branch)]), speed)
         if not len(closer) or len(speed) > _MOST_SPEEDS:
             break
         speed = np.union1d(speed, closer)
-    criticals = [_critical(solver, low, high, shapes)
-                 for low, high, shapes in _crossings(speed, found, branch)]
+    criticals = _close(solver, *_crossings(speed, found, branch))
     return tuple(sorted(criticals, key=lambda critical: critical.speed))
 
 
@@ -208,7 +216,7 @@ def _follow(found: Spectrum) -> IntArray:
         before, after = found.frequency[index - 1, old, None], found.frequency[index, new]
         gap = np.abs(after - before) / np.abs(after + before)
         ends, starts = linear_sum_assignment(gap - likeness)
-        alike = (likeness - gap)[ends, starts] > 0.3
+        alike = (likeness - gap)[ends, starts] > _ALIKE
         branch[index, new[starts[alike]]] = branch[index - 1, old[ends[alike]]]
         fresh = new[branch[index, new] < 0]
         branch[index, fresh] = free + np.arange(len(fresh))
@@ -232,44 +240,68 @@ def _touching(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArra
     return np.array(closer)
 
 
+def _torn(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
+    """Return speeds between which a curve ends and another begins that may be its end."""
+    closer = []
+    low = found.frequency.real < _ABOVE**0.5 * speed[-1]
+    for i, (before, after) in enumerate(itertools.pairwise(branch)):
+        ends = np.setdiff1d(before[low[i]], after)
+        starts = np.setdiff1d(after[low[i + 1]], before)
+        if np.any(ends >= 0) and np.any(starts >= 0):
+            closer.append(0.5 * (speed[i] + speed[i + 1]))
+    return np.array(closer)
+
+
 def _crossings(
     speed: FloatArray, found: Spectrum, branch: IntArray,
-) -> Iterator[tuple[float, float, ComplexArray]]:
-    """Yield two speeds between which a curve crosses omega = Omega, and its shapes there."""
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Return speeds (c, 2), omega - Omega (c, 2) and shapes (c, 2, d) around each crossing."""
+    rows, modes = [], []
     for name in range(branch.max(initial=-1) + 1):
         row, mode = np.nonzero(branch == name)
         above = found.frequency[row, mode].real > speed[row]
         for i in np.flatnonzero(above[:-1] != above[1:]):
-            pair = slice(i, i + 2)
-            low, high = speed[row[pair]]
-            yield float(low), float(high), found.shape[row[pair], mode[pair]]
+            rows.append(row[i:i + 2])
+            modes.append(mode[i:i + 2])
+    at, which = (np.array(pairs, dtype=int).reshape(-1, 2) for pairs in (rows, modes))
+    return speed[at], found.frequency[at, which].real - speed[at], found.shape[at, which]
+
+
+def _close(
+    solver: SpectrumSolver, ends: FloatArray, excess: FloatArray, shapes: ComplexArray,
+) -> list[CriticalSpeed]:
+    """Close all brackets at once by the false position, in its Illinois variant."""
+    if not len(ends):
+        return []
+    wanted, rows = _unit(shapes).conj().transpose(0, 2, 1), np.arange(len(ends))
+    last = np.full(len(ends), -1)
+    for _ in range(_STEPS):
+        speed = ((ends[:, 0] * excess[:, 1] - ends[:, 1] * excess[:, 0])
+                 / (excess[:, 1] - excess[:, 0]))
+        found = solver.solve(speed, _ALL)
+        # Of all modes at a speed the one most like those at both ends.
+        mode = np.nansum(np.abs(_unit(found.shape) @ wanted), axis=2).argmax(axis=1)
+        height = found.frequency[rows, mode].real - speed
+        if np.all(np.abs(height) <= _FOUND * speed):
+            break
+        side = np.where((height > 0.0) == (excess[:, 0] > 0.0), 0, 1)
+        excess[rows, 1 - side] *= np.where(side == last, 0.5, 1.0)
+        ends[rows, side], excess[rows, side], last = speed, height, side
+    return [_critical(solver, found, float(speed[row]), row, int(mode[row]))
+            for row in range(len(speed))]
 
 
 def _critical(
-    solver: SpectrumSolver, low: float, high: float, shapes: ComplexArray,
+    solver: SpectrumSolver, found: Spectrum, speed: float, row: int, mode: int,
 ) -> CriticalSpeed:
-    """Close in on the crossing of the curve that has these shapes at both ends, (2, d)."""
-    wanted = _unit(shapes).conj().T
-
-    def likeness(found: Spectrum) -> FloatArray:
-        return np.asarray(np.nansum(np.abs(_unit(found.shape[0]) @ wanted), axis=1))
-
-    def mode_at(speed: float) -> tuple[Spectrum, int]:
-        found = solver.solve(np.array([speed]), _ALL)
-        return found, int(likeness(found).argmax())
-
-    def excess(speed: float) -> float:
-        found, mode = mode_at(speed)
-        return float(found.frequency[0, mode].real - speed)
-
-    speed = brentq(excess, low, high, xtol=_FOUND * high, rtol=_FOUND)
-    found, mode = mode_at(speed)
-    frequency = found.frequency[0, mode]
-    deflection = solver.deflection(found.rotor[0, mode])
+    frequency, support = found.frequency[row, mode], found.support[row, mode]
+    deflection = solver.deflection(found.rotor[row, mode])
     largest = np.abs(deflection).max()
-    return CriticalSpeed(speed, int(found.whirl[0, mode]),
+    if not largest > _STILL * np.abs(support).max(initial=0.0):
+        largest = np.abs(support).max()
+    return CriticalSpeed(speed, int(found.whirl[row, mode]),
                          float(frequency.imag / np.abs(frequency)),
-                         deflection / largest, found.support[0, mode] / largest)
+                         deflection / largest, support / largest)
 
 
 def _unit(shape: ComplexArray) -> ComplexArray:

@@ -21,13 +21,16 @@ from rotorsoil_ros.physics.quasistatic import (
 # A peak rises by this factor over the valleys beside it ...
 _PROMINENCE = 1.5
 # ... and to this share of the largest amplitude of its sweep.
-_NEGLIGIBLE = 0.05
+_NEGLIGIBLE = 0.1
 
 # A sweep spans this share of its highest speed, and ends where the speed turns back by it.
 _SPAN = 0.1
 
 # Samples over which a median is taken, and from how many samples on.
 _MEDIANS = ((40, 5), (20, 3))
+
+# Peaks of several channels within this share of the speed are one resonance.
+_SAME_RESONANCE = 0.055
 
 # Peaks further apart than this share of the predicted speed do not belong together.
 _FARTHEST = 0.35
@@ -245,3 +248,20 @@ def pair(
     pairs += [PeakPair(channel, None, measured[j], damping_ratio(measured[j]), math.nan)
               for j in sorted(right)]
     return pairs
+
+
+def told_once(pairs: Sequence[PeakPair]) -> list[PeakPair]:
+    """Leave out peaks without a partner where another channel has a pair at the same speed."""
+    told = [(each.predicted.speed, each.measured.speed) for each in pairs
+            if each.predicted is not None and each.measured is not None]
+
+    def is_told(each: PeakPair) -> bool:
+        if each.predicted is None and each.measured is not None:
+            return any(abs(each.measured.speed / speed - 1.0) < _SAME_RESONANCE
+                       for _, speed in told)
+        if each.measured is None and each.predicted is not None:
+            return any(abs(each.predicted.speed / speed - 1.0) < _SAME_RESONANCE
+                       for speed, _ in told)
+        return False
+
+    return [each for each in pairs if not is_told(each)]

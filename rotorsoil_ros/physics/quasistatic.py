@@ -17,7 +17,7 @@ _APPROACH = 3.0
 
 # Afterwards the free vibration decays as exp(-p tau) while the forced one falls as 1 / tau:
 # at tau = 5 / p it is down to a twentieth of it.
-_DECAY = 5.0
+DECAY = 5.0
 
 # Up to where behind the resonance a passage moves the peak, without damping, in units of the
 # square root of the rate: Lewis' limit.
@@ -103,6 +103,6 @@ def is_quasi_static(
         passage[moving] = bandwidth / root[moving]
         beyond = np.zeros(len(time))
         beyond[moving] = ((speed - resonance.speed) * np.sign(rate))[moving] / root[moving]
-        reach = np.maximum(_APPROACH, _DECAY / np.maximum(passage, np.finfo(float).tiny))
+        reach = np.maximum(_APPROACH, DECAY / np.maximum(passage, np.finfo(float).tiny))
         holds &= ~((passage < SLOW_ENOUGH) & (beyond > -_APPROACH) & (beyond < reach))
     return holds

@@ -203,12 +203,7 @@ class RationalMatrix:
         least = min(worst for worst, _ in fits)
         enough = _TOLERANCE if least <= _TOLERANCE else max(_ROUGH, 10.0 * least)
         count = next(i for i, (worst, _) in enumerate(fits, 1) if worst <= enough)
-        while True:
-            fit = cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
-            # What no ground does: growing on its own. The fit has followed the errors.
-            if count == 1 or not np.any(fit.states(_ROUGH).poles.imag < 0.0):
-                return fit
-            count -= 1
+        return cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:
         """Return the function at real or complex frequencies, (..., d, d)."""

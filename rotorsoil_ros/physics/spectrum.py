@@ -227,9 +227,9 @@ class SpectrumSolver:
                                  f'{rad_s_to_rpm(float(speed[~sound][0])):g} rpm')
         low, high = self.span
         known = (frequency.real >= low) & (frequency.real <= high)
-        known &= self.compliance.agrees(np.where(known, frequency, high))
         frequency = np.where(known, frequency, np.nan)
-        order = np.argsort(frequency.real, axis=1)[:, :count]
+        most = min(count, int(np.isfinite(frequency).sum(axis=1).max()))
+        order = np.argsort(frequency.real, axis=1)[:, :most]
         return self._spectrum(vibration, amplitude, np.take_along_axis(frequency, order, axis=1),
                               np.take_along_axis(vector, order[..., None], axis=1))
 

@@ -102,6 +102,15 @@ def test_foreign_file_is_reported_and_not_used(tmp_path, caplog, foreign):
     assert caplog.records
 
 
+def test_file_that_lost_an_array_is_not_used(tmp_path, caplog):
+    files, path = _stored(tmp_path)
+    with np.load(path) as whole:
+        rest = {name: whole[name] for name in whole.files if name != 'b'}
+    np.savez(path, **rest)
+    assert files.load('kind', KEY) is None
+    assert 'holds something else' in caplog.text
+
+
 def test_objects_are_not_pickled(tmp_path):
     with pytest.raises(TypeError, match='pickled'):
         Cache(tmp_path).store('kind', KEY, {'a': np.array([{}])})

@@ -79,7 +79,7 @@ def test_missing_file_and_directory_are_refused(tmp_path):
 
 def test_override_replaces_and_adds_in_order():
     document = {'blocks': [{'mass': 1.0}, {'mass': 2.0}], 'soil': None}
-    override(document, ['blocks.1.mass=420', 'soil.loss=1e-1', 'name=a=b', 'blocks.1.mass=42e1'])
+    override(document, ['blocks.1.mass=7', 'soil.loss=1e-1', 'name=a=b', 'blocks.1.mass=42e1'])
     assert document == {'blocks': [{'mass': 1.0}, {'mass': 420.0}], 'soil': {'loss': 0.1},
                         'name': 'a=b'}
 

@@ -7,8 +7,11 @@ import sys
 import time
 
 import pytest
+from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.live import bag_reader
+from rotorsoil_ros.live.messages import JOINT_STATE
+from rotorsoil_ros.physics.errors import InputError
 
 STOPS_WITHIN_S = 1.0
 STARTS_WITHIN_S = 3.0
@@ -69,3 +72,48 @@ def test_bad_input_ends_the_process_with_2_and_one_line(start, parameter, compla
     assert process.wait(10.0) == 2
     assert len(told) == 1
     assert complaint in told[0]
+
+
+def speak(graph, until):
+    """Publish speeds of the fan at 100 Hz until something holds; return their stamps [ns]."""
+    publish = graph.probe.create_publisher(JointState, '/fan/joint_states', 1000).publish
+    said = []
+
+    def tell():
+        message = JointState(name=['rotor'], velocity=[300.0])
+        said.append(time.time_ns())
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(said[-1], 10**9)
+        publish(message)
+
+    graph.until(lambda: graph.probe.count_subscribers('/fan/joint_states'), 'discovery')
+    timer = graph.probe.create_timer(0.01, tell)
+    graph.until(lambda: until(said), 'enough speeds')
+    graph.probe.destroy_timer(timer)
+    return said
+
+
+def test_a_kill_loses_at_most_a_second_and_the_next_start_saves_the_rest(
+        start, graph, tmp_path):
+    process, _ = start(f'log.directory:={tmp_path}', 'speed_depth:=1000', 'log.rerun:=false')
+    said = speak(graph, lambda said: len(said) > 50 and said[-1] - said[0] > 2.3e9)
+    process.kill()
+    process.wait(10.0)
+    broken = tmp_path / 'run' / 'run_0.mcap'
+    before = broken.read_bytes()
+    with pytest.raises(InputError, match='was never finished'):
+        bag_reader.topics(tmp_path / 'run')
+
+    _, told = start(f'log.directory:={tmp_path}', 'log.rerun:=false', until='was never finished')
+    assert sum('was never finished' in line for line in told) == 1
+    assert broken.read_bytes() == before
+    graph.until(lambda: 'recovered' in (tmp_path / 'run' / 'metadata.yaml').read_text(),
+                'new metadata')
+    assert bag_reader.topics(tmp_path / 'run')['/rotorsoil/fan/amplitude'][0] == JOINT_STATE
+    answered = [stamp for source, stamp, _ in bag_reader.messages(
+        tmp_path / 'run', lambda topic, _: topic == '/rotorsoil/fan/amplitude')]
+    # A second of the flush, and what was under way while the machine was busy.
+    assert said[-1] - answered[-1] < 1.1e9
+    assert set(answered) <= set(said)
+
+    _, told = start(f'log.directory:={tmp_path}', 'log.rerun:=false')
+    assert not any('was never finished' in line for line in told)

@@ -149,7 +149,7 @@ def test_a_viewer_that_does_not_listen_is_told_and_costs_nothing(machine):
     settings = LogSettings(
         directory='', name='run', mcap=False, rerun=False, split_mib=0.0, split_s=0.0,
         rerun_url='rerun+http://127.0.0.1:9/proxy')
-    log = RunLog(settings, {'fan': machine}, tell=told.append)
+    log = RunLog(settings, {'fan': machine}, tell=told.append, complain=told.append)
     log.show(predicted(machine, [300.0]))
     log.flush()
     log.close()

@@ -185,10 +185,12 @@ def test_fast_solve_is_the_dense_one(model):
         np.testing.assert_allclose(got / scale, expected / scale, rtol=1e-8, atol=1e-13)
 
 
-def test_fast_solve_holds_at_the_poles_of_the_rotor_itself():
+@pytest.mark.parametrize('gap', [0.0, 1e-14, -4e-13, 1e-11])
+def test_fast_solve_holds_at_the_poles_of_the_rotor_itself_and_beside_them(gap):
     model = paper_machine()
     modes = model._synchronous_modes
     poles = np.sort(modes.inverse[modes.inverse > 0.0])[::-1][:4] ** -0.5
+    poles = poles * (1.0 + gap)
     fast, slow = (solve(poles, UNBALANCE) for solve in (
         model.unbalance_response, lambda *given: dense_response(model, *given)))
     moving = [i for i, name in enumerate(model.channels) if name != 'block_y']

@@ -105,3 +105,28 @@ def test_prior_without_spread_is_refused():
     with pytest.raises(RotorSoilError, match='prior_deviation must be > 0, got 0'):
         identify(lambda factor: np.ones((3, 1, 1)), np.ones((3, 1)), names=['a'],
                  prior_deviation=0.0)
+
+
+def test_truth_far_from_the_start_is_found():
+    # A shaft resonance moved by a factor 6: the peaks do not overlap, no slope leads there.
+    speed = np.linspace(20.0, 120.0, 80)
+
+    def respond(factor):
+        natural = 90.0 * np.sqrt(factor[0])
+        return (speed**2 / (natural**2 - speed**2 + 0.02j * natural * speed))[:, None, None]
+
+    measured = respond(np.array([1.0 / 6.0]))[:, :, 0] * 3e-6
+    found = identify(respond, measured, names=['k'], prior_deviation=np.log(2.0))
+    assert found.factor[0] == pytest.approx(1.0 / 6.0, rel=1e-3)
+
+
+def test_model_that_explains_nothing_is_refused():
+    speed = np.linspace(20.0, 120.0, 80)
+    measured = np.exp(1j * np.random.default_rng(0).uniform(0.0, 6.3, size=(80, 1)))
+
+    def respond(factor):
+        natural = 90.0 * np.sqrt(factor[0])
+        return (speed**2 / (natural**2 - speed**2 + 0.02j * natural * speed))[:, None, None]
+
+    with pytest.raises(NotSolvedError, match='no value of k explains the run: the best leaves'):
+        identify(respond, measured, names=['k'], prior_deviation=np.log(2.0))

@@ -126,3 +126,25 @@ def test_samples_before_the_first_speed_are_refused():
 def test_broken_track_is_refused(time, speed):
     with pytest.raises(RotorSoilError, match='a speed track needs'):
         SpeedTrack(np.array(time), np.array(speed))
+
+
+def test_measured_angle_keeps_the_phase_where_speeds_are_off():
+    time = np.linspace(0.0, 60.0, 30001)
+    true = 100.0 * time
+    signal = -100.0**2 * np.cos(true + 0.4)
+    marks = np.linspace(0.0, 60.0, 601)
+    speed = np.full(601, 100.05)  # half a per mille: 3 rad in a minute
+    drifting = SpeedTrack(marks, speed, angle_at_start=0.0)
+    held = SpeedTrack(marks, speed, angle=np.angle(np.exp(100j * marks)))
+    late = time > 59.0
+    assert held.has_phase
+    assert np.angle(demodulate(time[late], signal[late], held).displacement[0]) == pytest.approx(
+        0.4, abs=0.01)
+    assert abs(np.angle(demodulate(time[late], signal[late], drifting).displacement[0])
+               - 0.4) > 1.0
+
+
+@pytest.mark.parametrize('angle', [np.zeros(2), np.full(3, np.nan)])
+def test_angle_that_is_not_told_everywhere_is_refused(angle):
+    with pytest.raises(RotorSoilError, match='a finite angle in rad at every sample'):
+        SpeedTrack(np.arange(3.0), np.ones(3), angle=angle)

@@ -60,8 +60,8 @@ def pinned_shaft(given, spring=1e13):
     return uniform_rotor(
         length=given['L'], diameter=given['d'], elements=28,
         material=Material(given['E'], given['nu'], given['rho']),
-        bearings=[bearing('a', 0.0, stiffness=spring),
-                  bearing('b', given['L'], stiffness=spring)])
+        bearings=[bearing('a', 0.0, stiffness=spring, foundation=None),
+                  bearing('b', given['L'], stiffness=spring, foundation=None)])
 
 
 @pytest.mark.usefixtures('no_shear')
@@ -94,6 +94,43 @@ def test_timoshenko_element_converges_with_the_second_order_of_its_mass():
         errors.append(abs(third / expected[2] - 1.0))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(rates > 1.8), rates
+
+
+@pytest.mark.usefixtures('no_shear')
+def test_element_without_shear_converges_with_fourth_order():
+    given, expected, _ = published('cf_ss_euler')
+    material = Material(given['E'], given['nu'], given['rho'])
+    errors = []
+    for elements in (4, 8, 16):
+        rotor = uniform_rotor(
+            length=given['L'], diameter=given['d'], elements=elements, material=material,
+            bearings=[bearing('a', 0.0, stiffness=1.0), bearing('b', given['L'], stiffness=1.0)])
+        stiffness, mass, polar = rotor.plane_matrices
+        free = np.setdiff1d(np.arange(len(mass)), [0, len(mass) - 2])
+        values = scipy.linalg.eigh(stiffness[np.ix_(free, free)],
+                                   (mass - 0.5 * polar)[np.ix_(free, free)], eigvals_only=True)
+        errors.append(np.sqrt(values[:3]) / (2.0 * math.pi) / expected - 1.0)
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(rates > 3.7), rates
+
+
+@pytest.mark.usefixtures('no_shear')
+def test_solid_cone_that_is_held_at_its_base_has_its_published_frequency():
+    # Its first eigenvalue is 8.719 (Conway, Becker & Dubil 1964, J. Applied Mechanics 31).
+    base, found = 0.02, []
+    for elements in (4, 8, 16):
+        section = ShaftSection(1.0, (base, 1e-6 * base), (0.0, 0.0), elements, STEEL)
+        rotor = Rotor(0.0, (section,), (), (bearing('a', 0.0, stiffness=1.0),
+                                            bearing('b', 1.0, stiffness=1.0)))
+        stiffness, mass, polar = rotor.plane_matrices
+        values = scipy.linalg.eigh(stiffness[2:, 2:], (mass - 0.5 * polar)[2:, 2:],
+                                   eigvals_only=True)
+        unit = STEEL.young_modulus / STEEL.density * base**2 / 16.0
+        found.append(np.sqrt(values[:3] / unit))
+    assert found[2][0] == pytest.approx(8.719, abs=5e-4)  # printed digits
+    coarse, middle, fine = found
+    rates = np.log2((coarse - middle)[1:] / (middle - fine)[1:])
+    assert np.all(rates > 3.4), rates
 
 
 @pytest.mark.usefixtures('no_shear')

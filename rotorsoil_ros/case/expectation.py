@@ -1,0 +1,145 @@
+"""What a case leads one to expect of a measured run: vectors, their band, critical speeds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rotorsoil_ros.case import models
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.band import Envelope, ResponseBand, SoilSpread
+from rotorsoil_ros.physics.comparison import Reference
+from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.physics.quasistatic import Resonance
+from rotorsoil_ros.physics.response import Predictor, ResponseTable
+from rotorsoil_ros.physics.soil_neighbours import (
+    depends_on_soil,
+    highest_poisson_ratio,
+    on_soils,
+)
+
+# Natural frequencies are looked for between these multiples of the highest speed: what decides
+# on the class of a support lies up to a quarter above it.
+_LOOKED_FOR = (0.02, 1.3)
+
+# A mode belongs to a direction if this share of the rotor's motion is in it.
+_IN_DIRECTION = 0.1
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """
+    A case, solved.
+
+    Attributes
+    ----------
+    case : Case
+        The machine.
+    model : CoupledModel
+        What it stands for.
+    table : ResponseTable
+        Its response.
+    modes : tuple of CriticalSpeed
+        Where omega = Omega, a little beyond the speed range.
+    band : ResponseBand or None
+        Its response on other soils; None on a support that knows of no soil.
+
+    """
+
+    case: Case
+    model: CoupledModel
+    table: ResponseTable
+    modes: tuple[CriticalSpeed, ...]
+    band: ResponseBand | None
+
+    @classmethod
+    def of(cls, case: Case, directory: Path, spread: SoilSpread) -> 'Expectation':
+        """Solve a case, with tables out of a cache, on its soil and on all of a spread."""
+        model = models.coupled_model(case, directory)
+        table = models.response_table(case, model, directory)
+        low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
+        band = None
+        if case.soil is not None and depends_on_soil(model):
+            soils = spread.soils(
+                case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
+            band = ResponseBand.build(table, on_soils(model, soils[1:]))
+        modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
+        return cls(case, model, table, modes, band)
+
+    @property
+    def criticals(self) -> tuple[CriticalSpeed, ...]:
+        """Critical speeds in the speed range."""
+        low, high = self.case.speed_range
+        return tuple(mode for mode in self.modes if low <= mode.speed <= high)
+
+    @property
+    def resonances(self) -> list[Resonance]:
+        """Critical speeds and damping ratios, those that are unstable without damping."""
+        return [Resonance(mode.speed, max(mode.damping_ratio, 0.0)) for mode in self.modes]
+
+    def lowest_natural_speed(self, axis: str) -> float:
+        """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
+        column = 'xz'.index(axis)
+        for mode in self.modes:
+            power = np.sum(np.abs(mode.deflection) ** 2, axis=0)
+            if power[column] >= _IN_DIRECTION * power.sum():
+                return mode.speed
+        return math.inf
+
+    def vector(self, unbalances: Mapping[str, complex]) -> ComplexArray:
+        """Return the unbalance of every plane [kg m]; a plane that is not named has none."""
+        return np.array([unbalances.get(plane, 0.0) for plane in self.table.planes],
+                        dtype=complex)
+
+    def reference(
+        self, stamp_ns: IntArray, speed: FloatArray,
+        unbalances: Sequence[tuple[int, ComplexArray]],
+        logged: ComplexArray | None = None,
+    ) -> Reference:
+        """
+        Return predictions and bands over a run.
+
+        Parameters
+        ----------
+        stamp_ns, speed : (m,) arrays
+            Reported speeds [ns], [rad/s].
+        unbalances : sequence of (int, (p,) complex array)
+            From which stamp on which unbalance [kg m]; the first also before it.
+        logged : (m, c) complex array or None
+            Displacements that a node answered; None to answer them now.
+
+        """
+        shape = len(speed), len(self.table.channels)
+        displacement = np.full(shape, complex(np.nan, np.nan))
+        low, high = np.full(shape, np.nan), np.full(shape, np.nan)
+        starts = np.searchsorted(stamp_ns, [start for start, _ in unbalances])
+        starts[0] = 0
+        for begin, end, (_, unbalance) in zip(
+                starts, [*starts[1:], len(speed)], unbalances, strict=True):
+            part = slice(int(begin), int(end))
+            if logged is None:
+                displacement[part] = answer(self.table.predictor(unbalance), speed[part])
+            if self.band is not None and begin < end:
+                envelope = self.envelope(unbalance).at(speed[part])
+                low[part], high[part] = envelope.low, envelope.high
+        return Reference(stamp_ns, speed, self.table.channels,
+                         displacement if logged is None else logged, low, high,
+                         self.table.speed_range)
+
+    def envelope(self, unbalance: ComplexArray) -> Envelope:
+        """Return the band under one unbalance [kg m]; only where there is a band."""
+        assert self.band is not None
+        return self.band.envelope(unbalance)
+
+
+def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
+    """Return displacements, (m, c), NaN where the table has none."""
+    found = np.full((len(speed), len(predictor.channels)), complex(np.nan, np.nan))
+    covered = predictor.covers(speed)
+    if covered.any():
+        found[covered] = predictor.predict(speed[covered]).displacement
+    return found

@@ -1,0 +1,360 @@
+"""Which machine a rotor is that ROSS has saved; ROSS itself is not needed."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+import math
+from pathlib import Path
+import re
+from typing import Any
+
+from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.ross_file import one_line, RossFile, Table
+from rotorsoil_ros.physics.units import rad_s_to_rpm
+
+_SPEED_RANGE_RPM = (0.0, 10_000.0)
+_SHAFT_HEIGHT = 1.0
+_SAME = 1e-12
+# What our shaft always has.
+_SHAFT_EFFECTS = ('shear_effects', 'rotary_inertia', 'gyroscopic')
+# Coefficients of a bearing that the plane of the rotor does not feel, or that we do not have.
+_OTHER_COEFFICIENTS = ('kzz', 'czz', 'mxx', 'mxy', 'myx', 'myy', 'mzz')
+_DIRECTIONS = (('xx', 'xx', 1.0), ('xz', 'xy', -1.0), ('zx', 'yx', -1.0), ('zz', 'yy', 1.0))
+
+
+@dataclass(frozen=True)
+class Imported:
+    """
+    A rotor as a case.
+
+    Attributes
+    ----------
+    content : dict
+        What a case file holds.
+    assumed : list of str
+        What ROSS does not know and a case needs.
+    lost : list of str
+        What could not be carried over.
+
+    """
+
+    content: dict[str, Any]
+    assumed: list[str]
+    lost: list[str]
+
+
+def read(path: Path, speed_range_rpm: tuple[float, float] | None = None) -> Imported:
+    """
+    Read a rotor that ROSS saved as TOML.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    speed_range_rpm : tuple of two floats or None
+        Of the case; None takes what the tables of the bearings cover.
+
+    Raises
+    ------
+    InputError
+        If the file is not such a rotor, or nothing of it could stand.
+
+    """
+    return _Importer(RossFile.read(path)).imported(speed_range_rpm)
+
+
+@dataclass
+class _Importer:
+    """
+    Turns the tables of a file into a case, noting what does not fit.
+
+    The spin of ROSS takes x into y, which is up; ours takes z, which is up, into x. So y
+    becomes z, and x changes its sign: cross terms do too.
+    """
+
+    file: RossFile
+    assumed: list[str] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
+
+    def imported(self, speed_range_rpm: tuple[float, float] | None) -> Imported:
+        shaft, nodes = self._shaft()
+        discs = [self._disc(title, table, nodes)
+                 for title, table in self.file.of_kind('Disk', 'Gear')]
+        discs += self._point_masses(nodes)
+        bearings = self._bearings(nodes)
+        self._note_strangers()
+        low, high = self._speed_range(bearings) if speed_range_rpm is None else speed_range_rpm
+        self.assumed += [
+            'support: rigid; for a machine on soil give soil, support and foundations',
+            f'rotor.shaft_height: {_SHAFT_HEIGHT:g} m, without effect on a rigid support',
+            'unbalances: none, a saved rotor has none']
+        content = {
+            'name': _name(self.file.path.stem, set()), 'support': {'model': 'rigid'},
+            'rotor': {'shaft_height': _SHAFT_HEIGHT, 'shaft': shaft, 'discs': discs,
+                      'bearings': bearings},
+            'unbalances': [], 'speed_range_rpm': [low, high]}
+        return Imported(content, self.assumed, self.lost)
+
+    # The shaft
+
+    def _shaft(self) -> tuple[list[dict[str, Any]], dict[int, float]]:
+        """Return the sections and the place of each node along them."""
+        elements = sorted(self.file.of_kind('ShaftElement'), key=lambda one: self.file.node(*one))
+        if not elements:
+            raise self.file.error('', 'holds no ShaftElement; is it a rotor saved by ROSS?')
+        columns = [list(group) for _, group in
+                   groupby(elements, key=lambda one: self.file.node(*one))]
+        first = self.file.node(*columns[0][0])
+        pieces, nodes, place = [], {first: 0.0}, 0.0
+        for number, column in enumerate(columns, start=first):
+            if self.file.node(*column[0]) != number:
+                raise self.file.error('', f'has no ShaftElement between nodes {number} and '
+                                          f'{number + 1}: the shaft must be continuous')
+            # The shaft itself is innermost; what is shrunk onto it is not.
+            column.sort(key=lambda one: self.file.number(one[0], one[1], 'idl'))
+            piece = self._piece(*column[0])
+            self._carry_layers(piece, column[1:])
+            pieces.append(piece)
+            place += piece['length']
+            nodes[number + 1] = place
+        return list(_merged(pieces)), nodes
+
+    def _piece(self, title: str, table: Table) -> dict[str, Any]:
+        self._note_effects(title, table)
+        outer, inner = (self.file.number(title, table, key) for key in ('odl', 'idl'))
+        ends = (self.file.number(title, table, 'odr', outer),
+                self.file.number(title, table, 'idr', inner))
+        piece: dict[str, Any] = {'length': self.file.number(title, table, 'L'),
+                                 'outer_diameter': outer, 'inner_diameter': inner}
+        if ends != (outer, inner):
+            piece['outer_diameter_end'], piece['inner_diameter_end'] = ends
+        return {**piece, 'elements': 1, 'material': self._material(title, table)}
+
+    def _note_effects(self, title: str, table: Table) -> None:
+        for key in _SHAFT_EFFECTS:
+            if not table.get(key, True):
+                self.lost.append(f'{title}: {key} = false; our shaft always has them')
+        for key in ('axial_force', 'torque', 'alpha', 'beta'):
+            if self.file.number(title, table, key, 0.0) != 0.0:
+                self.lost.append(f'{title}: {key} = {table[key]:g}')
+        method = table.get('shear_method_calc', 'cowper')
+        if method != 'cowper':
+            self.lost.append(f'{title}: shear_method_calc = {shown(method)}; ours is cowper')
+
+    def _carry_layers(self, piece: dict[str, Any], layers: Sequence[tuple[str, Table]]) -> None:
+        """Add further elements between the same nodes as mass."""
+        for title, table in layers:
+            layer = self._piece(title, table)
+            area = 0.25 * math.pi * sum(
+                sign * (left**2 + left * right + right**2) / 3.0 for sign, left, right in (
+                    (1.0, layer['outer_diameter'],
+                     layer.get('outer_diameter_end', layer['outer_diameter'])),
+                    (-1.0, layer['inner_diameter'],
+                     layer.get('inner_diameter_end', layer['inner_diameter']))))
+            mass = area * layer['material']['density']
+            piece['added_mass'] = piece.get('added_mass', 0.0) + mass
+            self.lost.append(f'{title}: stiffness and rotary inertia of a second layer; its mass '
+                             f'is kept as added_mass, {mass:g} kg/m')
+
+    def _material(self, title: str, table: Table) -> dict[str, float]:
+        material = table.get('material')
+        if not isinstance(material, dict):
+            raise self.file.error(f'{title}.material', 'is missing')
+        place = f'{title}.material'
+        young = self.file.number(place, material, 'E')
+        poisson = (self.file.number(place, material, 'Poisson') if 'G_s' not in material
+                   else young / (2.0 * self.file.number(place, material, 'G_s')) - 1.0)
+        return {'young_modulus': young, 'poisson_ratio': poisson,
+                'density': self.file.number(place, material, 'rho')}
+
+    # Discs, point masses and bearings
+
+    def _disc(self, title: str, table: Table, nodes: Mapping[int, float]) -> dict[str, Any]:
+        if title.startswith('Gear'):
+            self.lost.append(f'{title}: its mesh; mass and inertia are kept as a disc')
+        return {'name': self._station(title, table), 'position': self._place(title, table, nodes),
+                'mass': self.file.number(title, table, 'm'),
+                'diametral_inertia': self.file.number(title, table, 'Id'),
+                'polar_inertia': self.file.number(title, table, 'Ip')}
+
+    def _point_masses(self, nodes: Mapping[int, float]) -> list[dict[str, Any]]:
+        """Return the masses on the shaft as discs without inertia."""
+        discs = []
+        for title, table in self.file.of_kind('PointMass'):
+            if self.file.node(title, table) not in nodes:
+                continue
+            masses = self._masses(title, table)
+            if masses['xx'] != masses['zz']:
+                self.lost.append(f'{title}: mass of {masses["xx"]:g} kg across; {masses["zz"]:g} '
+                                 'kg is kept in both directions')
+            discs.append({'name': self._station(title, table),
+                          'position': self._place(title, table, nodes), 'mass': masses['zz'],
+                          'diametral_inertia': 0.0, 'polar_inertia': 0.0})
+        return discs
+
+    def _masses(self, title: str, table: Table) -> dict[str, float]:
+        both = self.file.number(title, table, 'm', 0.0)
+        return {ours: self.file.number(title, table, theirs, both)
+                for ours, theirs in (('xx', 'mx'), ('zz', 'my'))}
+
+    def _bearings(self, nodes: Mapping[int, float]) -> list[dict[str, Any]]:
+        found: list[tuple[str, Table]] = [
+            (title, table) for title, table in self.file.tables.items()
+            if isinstance(table, dict) and 'kxx' in table and 'n' in table]
+        on_shaft = [one for one in found if self.file.node(*one) in nodes]
+        below: list[tuple[str, Table]] = [
+            one for one in found if self.file.node(*one) not in nodes]
+        masses = [one for one in self.file.of_kind('PointMass')
+                  if self.file.node(*one) not in nodes]
+        bearings = []
+        for title, table in on_shaft:
+            bearing = {'name': self._station(title, table),
+                       'position': self._place(title, table, nodes),
+                       'stiffness': self._matrix(title, table, 'k', 'N/m'),
+                       'damping': self._matrix(title, table, 'c', 'N s/m')}
+            self._note_coefficients(title, table)
+            pedestal = self._pedestal(title, table, below, masses)
+            if pedestal is not None:
+                bearing['pedestal'] = pedestal
+            bearings.append(bearing)
+        for title, _ in below:
+            self.lost.append(f'{title}: stands on nothing that was carried over')
+        for title, table in masses:
+            self.lost.append(f'{title}: {shown(table.get("m", table.get("mx")))} kg at node '
+                             f'{shown(table.get("n"))}')
+        return bearings
+
+    def _pedestal(
+        self, title: str, table: Table, below: list[tuple[str, Table]],
+        masses: list[tuple[str, Table]],
+    ) -> dict[str, Any] | None:
+        """Return what holds a bearing's housing, taking it out of what is still to be placed."""
+        if table.get('n_link') is None:
+            return None
+        link = table['n_link']
+        supports = [one for one in below if one[1].get('n') == link]
+        if not supports:
+            self.lost.append(f'{title}: n_link = {shown(link)}, where nothing stands')
+            return None
+        support_title, support = supports[0]
+        stiffness = self._matrix(support_title, support, 'k', 'N/m')
+        damping = self._matrix(support_title, support, 'c', 'N s/m')
+        if 'speed_rpm' in stiffness or 'speed_rpm' in damping:
+            self.lost.append(f'{support_title}: a pedestal with a table over speed; {title} '
+                             'stands on rigid ground instead')
+            below.remove(supports[0])
+            return None
+        below.remove(supports[0])
+        self._note_coefficients(support_title, support)
+        if support.get('n_link') is not None:
+            self.lost.append(f'{support_title}: n_link, a second support below the first')
+        return {'mass': self._mass_at(link, masses), 'stiffness': stiffness, 'damping': damping}
+
+    def _mass_at(self, node: object, masses: list[tuple[str, Table]]) -> dict[str, float]:
+        total = {'xx': 0.0, 'zz': 0.0}
+        for one in [one for one in masses if one[1].get('n') == node]:
+            for axis, mass in self._masses(*one).items():
+                total[axis] += mass
+            masses.remove(one)
+        return total
+
+    def _matrix(self, title: str, table: Table, letter: str, unit: str) -> dict[str, Any]:
+        """Return stiffness or damping over our axes, as constants or as a table over speed."""
+        columns = {ours: [sign * value + 0.0 for value in self._column(
+                              title, table, f'{letter}{theirs}', unit)]
+                   for ours, theirs, sign in _DIRECTIONS}
+        speed = table.get('frequency')
+        if all(len(set(column)) == 1 for column in columns.values()):
+            return {key: column[0] for key, column in columns.items()
+                    if key in ('xx', 'zz') or column[0] != 0.0}
+        if speed is None:
+            raise self.file.error(f'{title}.frequency', 'is missing, in rad/s; the coefficients '
+                                                        'are a table')
+        speeds = self.file.numbers(title, table, 'frequency', 'rad/s')
+        count = len(speeds)
+        for key, column in columns.items():
+            if len(column) == 1:
+                columns[key] = column * count
+            elif len(column) != count:
+                raise self.file.error(title, 'must have as many coefficients as frequency, '
+                                             f'{count}, got {len(column)}')
+        return {'speed_rpm': [rad_s_to_rpm(value) for value in speeds],
+                **{key: column for key, column in columns.items()
+                   if key in ('xx', 'zz') or any(column)}}
+
+    def _column(self, title: str, table: Table, key: str, unit: str) -> list[float]:
+        if key not in table and key[1:] in ('xy', 'yx'):
+            return [0.0]
+        return self.file.numbers(title, table, key, unit)
+
+    def _note_coefficients(self, title: str, table: Table) -> None:
+        for key in _OTHER_COEFFICIENTS:
+            if key in table and any(self.file.numbers(title, table, key, 'SI')):
+                self.lost.append(f'{title}: {key} = {shown(table[key])}')
+        if not re.match(r'(Bearing|Seal)Element', title):
+            self.lost.append(f'{title}: its geometry; its coefficients are kept')
+
+    def _speed_range(self, bearings: Sequence[Table]) -> tuple[float, float]:
+        tables = [matrix['speed_rpm'] for bearing in bearings
+                  for matrix in (bearing['stiffness'], bearing['damping'])
+                  if 'speed_rpm' in matrix]
+        low = max((table[0] for table in tables), default=_SPEED_RANGE_RPM[0])
+        high = min((table[-1] for table in tables), default=_SPEED_RANGE_RPM[1])
+        self.assumed.append(f'speed_range_rpm: {low:g} to {high:g}'
+                            + (', what the tables of the bearings cover' if tables else ''))
+        return low, high
+
+    def _note_strangers(self) -> None:
+        for title, table in self.file.tables.items():
+            known = title.startswith(('ShaftElement', 'Disk', 'Gear', 'PointMass'))
+            carried = isinstance(table, dict) and 'n' in table and (known or 'kxx' in table)
+            if title == 'ross_version' or carried or not table:
+                continue
+            self.lost.append(f'{one_line(title)}: is not known here')
+
+    def _place(self, title: str, table: Table, nodes: Mapping[int, float]) -> float:
+        node = self.file.node(title, table)
+        if node not in nodes:
+            raise self.file.error(f'{title}.n', f'must be a node of the shaft, 0 to {max(nodes)}, '
+                                                f'got {node}')
+        return nodes[node]
+
+    def _station(self, title: str, table: Table) -> str:
+        tag = table.get('tag')
+        return _name(tag if isinstance(tag, str) and tag else title, self.names)
+
+
+def _name(text: str, taken: set[str]) -> str:
+    """Return a name that a case allows and that is not taken, and take it."""
+    plain = re.sub(r'[^a-z0-9]+', '_', text.lower()).strip('_')[:50]
+    plain = plain if plain[:1].isalpha() else f'part_{plain}'.rstrip('_')
+    name, number = plain, 2
+    while name in taken:
+        name, number = f'{plain}_{number}', number + 1
+    taken.add(name)
+    return name
+
+
+def _merged(pieces: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield sections: equal cylindrical pieces that follow one another become one."""
+    section: dict[str, Any] | None = None
+    for piece in pieces:
+        if section is not None and _alike(section, piece):
+            section['length'] += piece['length']
+            section['elements'] += 1
+            continue
+        if section is not None:
+            yield section
+        section = dict(piece)
+    if section is not None:
+        yield section
+
+
+def _alike(section: Mapping[str, Any], piece: Mapping[str, Any]) -> bool:
+    if 'outer_diameter_end' in section or 'outer_diameter_end' in piece:
+        return False
+    each = section['length'] / section['elements']
+    same = all(section.get(key) == piece.get(key) for key in (
+        'outer_diameter', 'inner_diameter', 'material', 'added_mass'))
+    return same and abs(each - piece['length']) <= _SAME * each

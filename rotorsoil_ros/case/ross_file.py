@@ -1,0 +1,99 @@
+"""What a TOML file of ROSS says, read with suspicion."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+import tomllib
+from typing import Any, TypeAlias
+
+from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.physics.errors import InputError
+
+Table: TypeAlias = Mapping[str, Any]
+
+_LARGEST_BYTES = 16 * 1024 * 1024
+
+
+def one_line(title: str) -> str:
+    """Return a title as it can be printed."""
+    return title if title.isprintable() else shown(title)
+
+
+def _is_number(value: object) -> bool:
+    return (isinstance(value, (int, float)) and not isinstance(value, bool)
+            and math.isfinite(value))
+
+
+@dataclass(frozen=True)
+class RossFile:
+    """
+    A saved rotor: one table for each element, called by class and tag.
+
+    Attributes
+    ----------
+    path : Path
+        Where it lies.
+    tables : dict
+        What it holds.
+
+    """
+
+    path: Path
+    tables: dict[str, Any]
+
+    @classmethod
+    def read(cls, path: Path) -> 'RossFile':
+        """Read a file; an InputError tells in one line what is wrong with it."""
+        try:
+            if path.stat().st_size > _LARGEST_BYTES:
+                raise InputError(f'{path}: must be smaller than {_LARGEST_BYTES} bytes')
+            return cls(path, tomllib.loads(path.read_text(encoding='utf-8')))
+        except OSError as error:
+            raise InputError(f'{path}: cannot be read: {error.strerror}') from error
+        except UnicodeDecodeError as error:
+            raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') \
+                from error
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
+            raise InputError(f'{path}: is not TOML: {" ".join(str(error).split())}') from error
+
+    def error(self, place: str, problem: str) -> InputError:
+        """Return the error to raise at a place of the file."""
+        return InputError(': '.join(filter(None, (str(self.path), one_line(place), problem))))
+
+    def of_kind(self, *kinds: str) -> Iterator[tuple[str, Table]]:
+        """Yield title and content of the elements of some classes of ROSS."""
+        for title, table in self.tables.items():
+            if isinstance(table, dict) and title.startswith(kinds) and 'n' in table:
+                yield title, table
+
+    def node(self, title: str, table: Table) -> int:
+        """Return the node on which an element stands or begins."""
+        node = table.get('n')
+        if not isinstance(node, int) or isinstance(node, bool) or node < 0:
+            raise self.error(f'{title}.n', f'must be the number of a node, got {shown(node)}')
+        return node
+
+    def number(
+        self, title: str, table: Table, key: str, default: float | None = None,
+    ) -> float:
+        """Return a finite number; without a default it has to be there."""
+        value = table.get(key, default)
+        if value is None:
+            raise self.error(f'{title}.{key}', 'is missing')
+        if not _is_number(value):
+            raise self.error(f'{title}.{key}', f'must be a finite number, got {shown(value)}')
+        return float(value)
+
+    def numbers(self, title: str, table: Table, key: str, unit: str) -> list[float]:
+        """Return coefficients, of which older files have one as a bare number."""
+        values = table.get(key)
+        if not isinstance(values, list):
+            return [self.number(title, table, key)]
+        for value in values:
+            if not _is_number(value):
+                raise self.error(f'{title}.{key}', f'must be finite numbers in {unit}, '
+                                                   f'got {shown(value)}')
+        if not values:
+            raise self.error(f'{title}.{key}', 'is empty')
+        return [float(value) for value in values]

@@ -1,0 +1,146 @@
+"""Which rotor the entries of a case file describe."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+import math
+
+import numpy as np
+
+from rotorsoil_ros.case import schema
+from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.faults import Faults
+from rotorsoil_ros.case.schema import Place
+from rotorsoil_ros.physics.arrays import FloatArray
+from rotorsoil_ros.physics.bearing import Bearing, Pedestal, SpeedTable
+from rotorsoil_ros.physics.rotor import Disc, Material, Probe, Rotor, ShaftSection
+from rotorsoil_ros.physics.soil import require
+from rotorsoil_ros.physics.units import rpm_to_rad_s
+
+_INERTIAS = ('mass', 'diametral_inertia', 'polar_inertia')
+_DIMENSIONS = ('outer_diameter', 'inner_diameter', 'width', 'density')
+
+
+@dataclass(frozen=True)
+class RotorEntries:
+    """Builds a rotor and says at which key it was refused."""
+
+    faults: Faults
+
+    def rotor(self) -> Rotor:
+        """Return shaft, discs, bearings and probes."""
+        entries = self.faults.entries.rotor
+        shaft = tuple(self._section(i, entry) for i, entry in enumerate(entries.shaft))
+        discs = tuple(self._disc(i, entry) for i, entry in enumerate(entries.discs))
+        bearings = tuple(self._bearing(i, entry) for i, entry in enumerate(entries.bearings))
+        probes = tuple(Probe(entry.name, entry.position) for entry in entries.probes)
+        with self.faults.at('rotor', entry=entries):
+            return Rotor(shaft_height=entries.shaft_height, shaft=shaft, discs=discs,
+                         bearings=bearings, probes=probes)
+
+    def _section(self, index: int, entry: schema.Section) -> ShaftSection:
+        place = ('rotor', 'shaft', index)
+        material = self._material(place, entry)
+        with self.faults.at(*place, entry=entry):
+            return ShaftSection(
+                length=entry.length, elements=entry.elements, material=material,
+                outer_diameter=_ends(entry.outer_diameter, entry.outer_diameter_end),
+                inner_diameter=_ends(entry.inner_diameter, entry.inner_diameter_end),
+                **({} if entry.added_mass is None else {'added_mass': entry.added_mass}))
+
+    def _material(self, section: Place, entry: schema.Section) -> Material:
+        own, common = entry.material, self.faults.entries.rotor.material
+        place = ('rotor', 'material') if own is None else (*section, 'material')
+        chosen = common if own is None else own
+        if chosen is None:
+            raise self.faults.error(*place, problem='is missing, and so is that of '
+                                                    + '.'.join(map(str, section)))
+        with self.faults.at(*place, entry=chosen):
+            return Material(**dict(chosen))
+
+    def _disc(self, index: int, entry: schema.Disc) -> Disc:
+        place = ('rotor', 'discs', index)
+        said = {key for key in entry.model_fields_set if getattr(entry, key) is not None}
+        by_size = not said.isdisjoint(_DIMENSIONS)
+        if by_size and not said.isdisjoint(_INERTIAS):
+            raise self.faults.error(
+                *place, problem='needs either mass, diametral_inertia and polar_inertia or '
+                                'outer_diameter, width and density, got '
+                                + ', '.join(sorted(said.intersection(_INERTIAS + _DIMENSIONS))))
+        keys = _DIMENSIONS if by_size else _INERTIAS
+        values = {key: getattr(entry, key) for key in keys}
+        for key, value in values.items():
+            if value is None:
+                raise self.faults.error(*place, key, problem='is missing')
+        with self.faults.at(*place, entry=entry):
+            if by_size:
+                return Disc.cylinder(entry.name, entry.position, **values)
+            return Disc(entry.name, entry.position, **values)
+
+    def _bearing(self, index: int, entry: schema.Bearing) -> Bearing:
+        place = ('rotor', 'bearings', index)
+        foundation = self._foundation_of(place, entry)
+        stiffness = self._matrix((*place, 'stiffness'), entry.stiffness)
+        damping = self._matrix((*place, 'damping'), entry.damping)
+        pedestal = None
+        if entry.pedestal is not None:
+            pedestal = self._pedestal((*place, 'pedestal'), entry.pedestal)
+        with self.faults.at(*place, entry=entry):
+            return Bearing(name=entry.name, position=entry.position, foundation=foundation,
+                           stiffness=stiffness, damping=damping, pedestal=pedestal)
+
+    def _foundation_of(self, place: Place, entry: schema.Bearing) -> str | None:
+        blocks = self.faults.entries.foundations
+        if entry.foundation is not None or not blocks:
+            return entry.foundation
+        if len(blocks) > 1:
+            names = ', '.join(block.name for block in blocks)
+            raise self.faults.error(*place, 'foundation',
+                                    problem=f'is missing; there are several: {names}')
+        return blocks[0].name
+
+    def _matrix(
+        self, place: Place,
+        entry: schema.Stiffness | schema.Damping | schema.StiffnessTable | schema.DampingTable,
+    ) -> FloatArray | SpeedTable:
+        if not isinstance(entry, (schema.StiffnessTable, schema.DampingTable)):
+            return _constant(entry)
+        count = len(entry.speed_rpm)
+        values = np.zeros((count, 2, 2))
+        for i, j, key in ((0, 0, 'xx'), (0, 1, 'xz'), (1, 0, 'zx'), (1, 1, 'zz')):
+            column = getattr(entry, key)
+            if column is not None and len(column) != count:
+                raise self.faults.error(
+                    *place, key, problem=f'must have as many entries as speed_rpm, {count}, '
+                                         f'got {len(column)}')
+            values[:, i, j] = 0.0 if column is None else column
+        self._require_speeds((*place, 'speed_rpm'), entry.speed_rpm)
+        return SpeedTable(rpm_to_rad_s(np.array(entry.speed_rpm)), values)
+
+    def _require_speeds(self, place: Place, speed_rpm: list[float]) -> None:
+        """Refuse speeds that do not rise, or leave a part of the speed range unknown."""
+        rises = all(left < right for left, right in pairwise(speed_rpm))
+        if not (len(speed_rpm) >= 2 and rises and speed_rpm[0] >= 0.0):
+            raise self.faults.error(*place, problem='must be two or more rising speeds >= 0 rpm, '
+                                                    f'got {shown(speed_rpm)}')
+        low, high = self.faults.entries.speed_range_rpm
+        if not (speed_rpm[0] <= low and high <= speed_rpm[-1]):
+            raise self.faults.error(
+                *place, problem=f'must cover speed_range_rpm, {low:g} to {high:g} rpm, '
+                                f'got {speed_rpm[0]:g} to {speed_rpm[-1]:g}')
+
+    def _pedestal(self, place: Place, entry: schema.Pedestal) -> Pedestal:
+        mass = entry.mass
+        masses = (mass.xx, mass.zz) if isinstance(mass, schema.MassPerAxis) else (mass, mass)
+        with self.faults.at(*place, entry=entry):
+            for value in masses:
+                require(0.0 <= value < math.inf, 'mass', '>= 0 kg and finite', value)
+            return Pedestal(mass=np.diag(masses), stiffness=_constant(entry.stiffness),
+                            damping=_constant(entry.damping))
+
+
+def _ends(left: float, right: float | None) -> tuple[float, float]:
+    return left, left if right is None else right
+
+
+def _constant(entry: schema.Stiffness | schema.Damping) -> FloatArray:
+    return np.array([[entry.xx, entry.xz], [entry.zx, entry.zz]])

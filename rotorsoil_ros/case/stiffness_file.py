@@ -1,0 +1,199 @@
+"""What somebody else computed or measured of the ground: a dynamic stiffness in a CSV file."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.physics.compliance_table import ComplianceTable, PASSIVITY, RECIPROCITY
+from rotorsoil_ros.physics.errors import InputError, RotorSoilError
+from rotorsoil_ros.physics.soil import DOFS
+from rotorsoil_ros.physics.units import hz_to_rad_s, rad_s_to_hz
+
+_FREQUENCIES = ('omega_rad_s', 'hz')
+_ENTRIES = {f'{row}{column}': (i, j) for i, row in enumerate(DOFS)
+            for j, column in enumerate(DOFS)}
+_LARGEST_BYTES = 32 * 1024 * 1024
+
+
+# Of a frequency: 1 Hz and 60 rpm differ in the last digit.
+_ROUND_OFF = 1e-12
+
+
+def read(path: Path, covering: tuple[float, float]) -> ComplianceTable:
+    """
+    Read the dynamic stiffness of a massless contact and return what it gives way by.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with a header: `omega_rad_s` or `hz`, then `<ij>_re,<ij>_im` [N/m, N, N m/rad] for
+        each entry, `ij` in xx, zz, xry, ... A dof without a column, or with empty cells only,
+        cannot move. Of two entries ij and ji one is enough.
+    covering : tuple of two floats
+        Frequencies that it has to know [rad/s].
+
+    Raises
+    ------
+    InputError
+        One line with file and place, if it is not symmetric, not passive, not readable, or
+        does not cover what it has to.
+
+    """
+    columns = _columns(path)
+    omega = _frequencies(path, columns, covering)
+    stiffness = _matrices(path, columns, len(omega))
+    free = _free_dofs(path, stiffness)
+    part = stiffness[np.ix_(np.arange(len(omega)), free, free)]
+    _require_symmetry(path, part, omega, free)
+    part = 0.5 * (part + part.swapaxes(1, 2))
+    _require_passivity(path, part, omega)
+    compliance = np.zeros_like(stiffness)
+    try:
+        unit = np.broadcast_to(np.eye(len(free)), part.shape)
+        compliance[np.ix_(np.arange(len(omega)), free, free)] = np.linalg.solve(part, unit)
+        # Solving leaves round-off between ij and ji.
+        return ComplianceTable(omega, 0.5 * (compliance + compliance.swapaxes(1, 2)))
+    except np.linalg.LinAlgError as error:
+        raise InputError(f'{path}: the stiffness of a dof that has columns must not be zero') \
+            from error
+    except RotorSoilError as error:
+        raise InputError(f'{path}: {error}') from error
+
+
+def _columns(path: Path) -> dict[str, FloatArray]:
+    """Return the numbers below each heading; NaN where a cell is empty."""
+    try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise InputError(f'{path}: must be smaller than {_LARGEST_BYTES} bytes')
+        text = path.read_text(encoding='utf-8-sig')
+    except OSError as error:
+        raise InputError(f'{path}: cannot be read: {error.strerror}') from error
+    except UnicodeDecodeError as error:
+        raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') from error
+    lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), start=1)
+             if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#')]
+    if not lines:
+        raise InputError(f'{path}: is empty')
+    header = [cell.strip() for cell in lines[0][1]]
+    _require_header(path, header)
+    numbers = np.array([[_number(path, line, name, cell) for name, cell
+                         in zip(header, _of_length(path, line, row, len(header)), strict=True)]
+                        for line, row in lines[1:]]).reshape(-1, len(header))
+    return dict(zip(header, numbers.T, strict=True))
+
+
+def _require_header(path: Path, header: list[str]) -> None:
+    known = {f'{name}_{part}' for name in _ENTRIES for part in ('re', 'im')}
+    for name in header:
+        if name not in known and name not in _FREQUENCIES:
+            raise InputError(f'{path}: column {shown(name)} is not known; needed are '
+                             f'{" or ".join(_FREQUENCIES)}, and xx_re, xx_im, zz_re, ...')
+        if header.count(name) > 1:
+            raise InputError(f'{path}: column {name} stands here twice')
+        other = f'{name[:-2]}{"im" if name.endswith("_re") else "re"}'
+        if name in known and other not in header:
+            raise InputError(f'{path}: column {other} is missing; {name} is there')
+    if sum(name in header for name in _FREQUENCIES) != 1:
+        raise InputError(f'{path}: needs one column {" or ".join(_FREQUENCIES)}')
+
+
+def _of_length(path: Path, line: int, row: list[str], count: int) -> list[str]:
+    if len(row) != count:
+        raise InputError(f'{path}: line {line}: must have {count} cells as the header has, '
+                         f'got {len(row)}')
+    return row
+
+
+def _number(path: Path, line: int, column: str, cell: str) -> float:
+    if not cell.strip() and column not in _FREQUENCIES:
+        return math.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f'{path}: line {line}: {column} must be a finite number, '
+                         f'got {shown(cell.strip())}')
+    return value
+
+
+def _frequencies(
+    path: Path, columns: dict[str, FloatArray], covering: tuple[float, float],
+) -> FloatArray:
+    name = next(name for name in _FREQUENCIES if name in columns)
+    values = columns[name]
+    if not (len(values) >= 2 and values[0] >= 0.0 and np.all(np.diff(values) > 0.0)):
+        raise InputError(f'{path}: {name} must be two or more rising frequencies >= 0, '
+                         f'got {shown(values.tolist())}')
+    omega = values.copy() if name == 'omega_rad_s' else hz_to_rad_s(values)
+    for end, needed in zip((0, -1), covering, strict=True):
+        if abs(omega[end] - needed) <= _ROUND_OFF * needed:
+            omega[end] = needed
+    if not (omega[0] <= covering[0] and covering[1] <= omega[-1]):
+        low, high, first, last = (rad_s_to_hz(one) for one in (*covering, omega[0], omega[-1]))
+        raise InputError(f'{path}: must cover speed_range_rpm, {low:g} to {high:g} Hz, '
+                         f'got {first:g} to {last:g} Hz')
+    return omega
+
+
+def _matrices(path: Path, columns: dict[str, FloatArray], count: int) -> ComplexArray:
+    """Return the stiffness, (n, 6, 6); NaN in dofs that are not there."""
+    stiffness = np.zeros((count, len(DOFS), len(DOFS)), dtype=complex)
+    known = {}
+    for name, place in _ENTRIES.items():
+        if f'{name}_re' not in columns:
+            continue
+        values = columns[f'{name}_re'] + 1j * columns[f'{name}_im']
+        empty = np.isnan(values)
+        if np.any(empty) and not np.all(empty):
+            raise InputError(f'{path}: {name} must be given at all frequencies or at none')
+        if not np.any(empty):
+            known[place] = values
+    for (i, j), values in known.items():
+        stiffness[:, i, j] = values
+        if (j, i) not in known:
+            stiffness[:, j, i] = values
+    for i, j in known:
+        for dof in (i, j):
+            if (dof, dof) not in known:
+                raise InputError(f'{path}: {DOFS[i]}{DOFS[j]} needs {DOFS[dof]}{DOFS[dof]}, '
+                                 'which is missing')
+    return stiffness
+
+
+def _free_dofs(path: Path, stiffness: ComplexArray) -> IntArray:
+    free = np.flatnonzero(np.any(np.einsum('kii->ki', stiffness) != 0.0, axis=0))
+    if not len(free):
+        raise InputError(f'{path}: needs the stiffness of one dof or more, as in zz_re and zz_im')
+    return free
+
+
+def _require_symmetry(
+    path: Path, stiffness: ComplexArray, omega: FloatArray, free: IntArray,
+) -> None:
+    skew = np.abs(stiffness - stiffness.swapaxes(1, 2)) / _units(stiffness)
+    k, i, j = np.unravel_index(skew.argmax(), skew.shape)
+    if not skew[k, i, j] <= RECIPROCITY:
+        row, column = DOFS[free[i]], DOFS[free[j]]
+        raise InputError(f'{path}: must be symmetric, got {stiffness[k, i, j]:g} for '
+                         f'{row}{column} and {stiffness[k, j, i]:g} for {column}{row} '
+                         f'at {omega[k]:g} rad/s')
+
+
+def _require_passivity(path: Path, stiffness: ComplexArray, omega: FloatArray) -> None:
+    loss = np.linalg.eigvalsh(stiffness.imag / _units(stiffness))[:, 0]
+    worst = int(loss.argmin())
+    if not loss[worst] >= -PASSIVITY:
+        raise InputError(f'{path}: must not give energy (imaginary part positive semidefinite), '
+                         f'got an eigenvalue of {loss[worst]:g} of the diagonal at '
+                         f'{omega[worst]:g} rad/s')
+
+
+def _units(stiffness: ComplexArray) -> FloatArray:
+    """Return what makes entries of different units comparable, (d, d)."""
+    size = np.sqrt(np.abs(np.einsum('kii->ki', stiffness)).max(axis=0))
+    return np.asarray(size[:, None] * size)

@@ -1,0 +1,148 @@
+"""Predicted against measured: what a vibration engineer acts on."""
+
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+import csv
+from importlib.resources import as_file, files
+import io
+import json
+import math
+from pathlib import Path
+
+from rotorsoil_ros.case import cache, models
+from rotorsoil_ros.case.comparison import compare as judge, Comparison, Rules, Run, Verdict
+from rotorsoil_ros.case.comparison_files import document, HEADER, rows
+from rotorsoil_ros.case.comparison_plots import all_figures
+from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.expectation import Expectation
+from rotorsoil_ros.case.report import (
+    channel_table,
+    exclusions,
+    page,
+    peak_table,
+    zone_table,
+)
+from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.physics.band import SoilSpread
+from rotorsoil_ros.physics.comparison import Matching
+from rotorsoil_ros.physics.errors import InputError, RotorSoilError
+from rotorsoil_ros.physics.units import rpm_to_rad_s
+from rotorsoil_ros.physics.zones import ISO_10816_3
+
+_VERDICT_FAILS = 1
+_DPI = 110
+
+
+def compare(arguments: Namespace) -> int:
+    """Hold a log against its prediction; write tables, pictures and a report; print a verdict."""
+    from rotorsoil_ros.live.measured_log import read_run, Reading
+
+    rules = _rules(arguments)
+    with progress('reading') as _:
+        run = read_run(arguments.log, Reading(machine=arguments.machine or ''))
+    with progress('solving') as _:
+        expectation = _expectation(arguments, run, rules)
+        comparison = judge(run, expectation, rules)
+    lines = list(_identification(arguments, comparison))
+    out: Path = arguments.output
+    out.mkdir(parents=True, exist_ok=True)
+    _print(comparison)
+    for line in lines:
+        print(line)
+    with progress('drawing') as _:
+        _write(comparison, out, source=str(arguments.log), identification=lines)
+    print(f'report    {out / "report.html"}')
+    print(f'verdict   {comparison.verdict}')
+    return 0 if comparison.verdict == Verdict.PASSES else _VERDICT_FAILS
+
+
+def _rules(arguments: Namespace) -> Rules:
+    slow_roll = arguments.slow_roll_rpm
+    return Rules(
+        matching=Matching(
+            tolerance=arguments.tolerance_s,
+            slow_roll_speed=math.nan if slow_roll is None else rpm_to_rad_s(slow_roll),
+            noise=1e-6 * arguments.noise_um),
+        spread=SoilSpread(shear_modulus_factor=arguments.soil_factor),
+        amplitude_margin=arguments.margin, zones=ISO_10816_3[arguments.zone_group])
+
+
+def _expectation(arguments: Namespace, run: Run, rules: Rules) -> Expectation | None:
+    """Return the case that is given, or the one of the package that the log was answered with."""
+    directory = cache.directory(arguments.cache)
+    if arguments.case is not None:
+        return Expectation.of(load(arguments.case, arguments.overrides), directory, rules.spread)
+    if arguments.overrides:
+        raise InputError('--set: needs the CASE that it overrides')
+    name, tables = run.description.get('case'), run.description.get('tables')
+    own = files('rotorsoil_ros') / 'config' / f'{name}.yaml'
+    if not (isinstance(name, str) and name.isidentifier() and isinstance(tables, dict)
+            and own.is_file()):
+        return None
+    with as_file(own) as path:
+        case = load(path)
+        key = models.response_key(case, models.coupled_model(case, directory))
+        if key != tables.get('response'):
+            return None
+        return Expectation.of(case, directory, rules.spread)
+
+
+def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[str]:
+    if not (arguments.identify or arguments.identify_unbalance):
+        if arguments.write_case is not None:
+            raise InputError('--write-case: needs --identify or --identify-unbalance')
+        return
+    from rotorsoil_ros.case.identification import describe, identify_case, Wanted, write_case
+
+    if comparison.expectation is None:
+        raise InputError('--identify: needs the CASE')
+    wanted = Wanted(
+        scalars=arguments.identify, planes=arguments.plane,
+        growth=arguments.identify_growth, runout=arguments.identify_runout,
+        with_transients=arguments.with_transients)
+    with progress('identifying') as _:
+        try:
+            found = identify_case(comparison, wanted, overrides=arguments.overrides)
+        except RotorSoilError as error:
+            if isinstance(error, InputError):
+                raise
+            yield f'identification refused: {error}'
+            return
+    yield from describe(found)
+    if arguments.write_case is not None:
+        write_case(found, arguments.write_case)
+        yield f'updated case {arguments.write_case}'
+
+
+def _write(
+    comparison: Comparison, out: Path, *, source: str, identification: Sequence[str],
+) -> None:
+    with (out / 'comparison.csv').open('w', encoding='utf-8', newline='') as stream:
+        writer = csv.writer(stream, lineterminator='\n')
+        writer.writerow(HEADER)
+        writer.writerows(rows(comparison))
+    content = {**document(comparison), 'log': source, 'identification': list(identification)}
+    (out / 'comparison.json').write_text(
+        json.dumps(content, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    pictures = []
+    for name, caption, figure in all_figures(comparison):
+        stream_of = io.BytesIO()
+        figure.savefig(stream_of, dpi=_DPI, format='png')
+        (out / f'{name}.png').write_bytes(stream_of.getvalue())
+        pictures.append((caption, stream_of.getvalue()))
+    (out / 'report.html').write_text(
+        page(comparison, pictures, source=source, identification=identification),
+        encoding='utf-8')
+
+
+def _print(comparison: Comparison) -> None:
+    for header, lines in (channel_table(comparison), peak_table(comparison),
+                          zone_table(comparison)):
+        if lines:
+            widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
+            for line in (header, *lines):
+                print('  '.join(cell.ljust(width) for cell, width in zip(
+                    line, widths, strict=True)).rstrip())
+            print()
+    print(*exclusions(comparison), *(f'note: {remark}' for remark in comparison.remarks),
+          *(f'fails: {failure}' for failure in comparison.failures), sep='\n')

@@ -1,0 +1,118 @@
+"""How do machines come into memory: every table is computed once, and not in this process."""
+
+from collections.abc import Callable, Iterable, Sequence
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from rotorsoil_ros.case import cache, config, models
+from rotorsoil_ros.case.cache import Cache
+from rotorsoil_ros.live.machine import Machine
+from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.physics.infinite import a0_range
+
+GLANCE_S = 0.05
+BAD_INPUT = 2
+
+Tell = Callable[[str], object]
+
+
+def load_all(
+    files: Iterable[Path], *, cache_directory: Path | None, tell: Tell,
+) -> dict[Path, Machine]:
+    """
+    Load case files, each once, and compute what the cache does not hold.
+
+    Soils of one kind share a table, so that one case of each kind goes first. Several tables
+    are computed by as many processes as there are cores.
+    """
+    cases = {file: config.load(file) for file in dict.fromkeys(files)}
+    directory = cache.directory(cache_directory)
+    kinds: dict[str, Path] = {}
+    for file, case in cases.items():
+        for key in soil_keys(case):
+            if not Cache(directory).path('compliance', key).exists():
+                kinds.setdefault(key, file)
+    if len(cases) > 1:
+        tabulate(list(dict.fromkeys(kinds.values())), directory, tell=tell)
+        tabulate([file for file, case in cases.items() if not _is_tabulated(case, directory)],
+                 directory, tell=tell)
+    return {file: Machine.load(file, cache_directory=cache_directory) for file in cases}
+
+
+def soil_keys(case: config.Case) -> list[str]:
+    """Return what identifies the tables of infinite elements that a case needs."""
+    geometry, soil = case.support.geometry, case.soil
+    if case.support.model != 'infinite_elements' or soil is None:
+        return []
+    keys = []
+    for foundation in case.foundations:
+        low, high = config.infinite_range(soil, foundation.contact, geometry, case.speed_range)
+        covered = a0_range(soil, foundation.contact, geometry, omega_min=low, omega_max=high)
+        keys.append(models.compliance_key(soil, geometry, *covered))
+    return keys
+
+
+def reload(file: Path, *, cache_directory: Path | None) -> Machine:
+    """
+    Load a case file again, computed by another process if need be.
+
+    Raises
+    ------
+    InputError
+        If the case is wrong or cannot be solved.
+
+    """
+    directory = cache.directory(cache_directory)
+    tabulate([file], directory, tell=lambda text: None)
+    return Machine.load(file, cache_directory=cache_directory)
+
+
+def tabulate(files: Sequence[Path], directory: Path, *, tell: Tell) -> None:
+    """Compute the tables of cases in parallel processes, which leave them in the cache."""
+    waiting, running, done = list(files), list[tuple[Path, subprocess.Popen[str]]](), 0
+    try:
+        while waiting or running:
+            while waiting and len(running) < (os.cpu_count() or 1):
+                running.append((waiting[0], _start(waiting.pop(0), directory)))
+            for file, process in list(running):
+                if _has_ended(process):
+                    running.remove((file, process))
+                    _judge(file, process)
+                    done += 1
+                    if len(files) > 1:
+                        tell(f'{done} of {len(files)} tables computed: {file}')
+    finally:
+        for _, process in running:
+            process.kill()
+            process.communicate()
+
+
+def _start(file: Path, directory: Path) -> 'subprocess.Popen[str]':
+    return subprocess.Popen(
+        [sys.executable, '-m', 'rotorsoil_ros.cli', 'tabulate', str(file), '--cache',
+         str(directory)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, 'OMP_NUM_THREADS': '1'})
+
+
+def _has_ended(process: 'subprocess.Popen[str]') -> bool:
+    try:
+        process.wait(GLANCE_S)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def _judge(file: Path, process: 'subprocess.Popen[str]') -> None:
+    """Raise InputError with what the process said if it failed."""
+    _, said = process.communicate()
+    if process.returncode == BAD_INPUT:
+        raise InputError(said.strip().splitlines()[-1] if said.strip() else f'{file}: failed')
+    if process.returncode:
+        raise InputError(f'{file}: its table was not computed (status {process.returncode})')
+
+
+def _is_tabulated(case: config.Case, directory: Path) -> bool:
+    key = models.response_key(case, models.coupled_model(case, directory))
+    return Cache(directory).path('response', key).exists()

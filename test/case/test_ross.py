@@ -1,0 +1,219 @@
+"""
+Rotors saved by ROSS: brought over whole, or with what is lost said.
+
+The files in `ross/` were saved by `Rotor.save` of ROSS 2.3.0. `hollow.toml`: solid, hollow and
+tapered elements of two materials, two discs, one of them overhung, a cross-coupled bearing with
+tables over speed. `extras.toml`: a bearing on a pedestal with a point mass, a seal. The numbers
+that they are held against are those of the same ROSS: `run_modal`, `run_unbalance_response` with
+1e-4 kg m on the first disc, and criticals as roots of its `run_modal` by brentq.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.case import models
+from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.ross import read
+from rotorsoil_ros.cli import main
+from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.physics.modes import campbell, critical_speeds
+
+FILES = Path(__file__).parent / 'ross'
+NO_CACHE = Path('no cache is needed on a rigid support')
+HOLLOW_AT_500 = [
+    -5.363399632192386 + 508.7018526938813j, -5.316344662377608 + 567.065846695789j,
+    -25.968084743509294 + 768.6000082702395j, -15.568166597805533 + 817.1367836091372j]
+HOLLOW_CRITICALS = [508.16531382445356, 571.0711473752397, 766.1588525836868, 826.3348492685868]
+SPEEDS = np.array([100.0, 400.0, 700.0, 1000.0])
+# horizontal and vertical of ROSS at its nodes 3 (wheel) and 9 (overhung fan)
+HOLLOW_RESPONSE = {
+    'wheel': [
+        (9.171597433835885e-08 + 8.72533984542036e-10j,
+         1.004583813617235e-09 - 8.37095069541607e-08j),
+        (2.438720070094516e-06 - 1.519500415378516e-07j,
+         -5.681993218468303e-08 - 2.169054622538942e-06j),
+        (3.2267051870574104e-06 - 1.2782106066524606e-06j,
+         3.4323813157018816e-07 + 5.400981804841605e-07j),
+        (-8.219632866056615e-06 - 6.745975689822327e-07j,
+         -6.855264300438222e-07 + 9.653283230682006e-06j)],
+    'overhung_fan': [
+        (-5.2308166614693664e-08 - 4.134121417465557e-10j,
+         -4.389307387363595e-10 + 5.278077454045083e-08j),
+        (-2.143870619531886e-06 + 1.1219763322720369e-07j,
+         2.9249768424582643e-08 + 2.0016145585612674e-06j),
+        (1.984770029284523e-05 - 1.8938137411531624e-06j,
+         -3.520130381719108e-07 - 1.7383390882975008e-05j),
+        (-4.6180393278975455e-06 - 6.403690476432977e-07j,
+         -6.515292922034885e-07 + 5.391263560626258e-06j)]}
+EXTRAS_AT_300 = [
+    -1.3428854319195582 + 243.06221620432456j, -0.8031419285158923 + 244.4019981744441j,
+    -24.180108503224687 + 1176.8084600486607j, -26.816377362577015 + 1299.4164682675078j]
+EXTRAS_DISC = [
+    (6.961132549448885e-07 + 6.354660914507501e-09j,
+     6.729924540653384e-09 - 6.784397435411925e-07j),
+    (-5.320792749385035e-06 - 1.4780989555879207e-08j,
+     -1.1199898276957084e-08 + 5.426433507672576e-06j),
+    (-3.7660865733592404e-06 - 1.4908241351227252e-08j,
+     -1.1526895419231148e-08 + 3.8058882138206476e-06j),
+    (-3.402503691364658e-06 - 2.6164461717460557e-08j,
+     -2.176980616983353e-08 + 3.450600306574059e-06j)]
+
+
+@pytest.fixture(scope='module')
+def imported(tmp_path_factory):
+    """Return the models of both files, brought over by the command."""
+    folder = tmp_path_factory.mktemp('imported')
+    for name in ('hollow', 'extras'):
+        assert main(['import-ross', str(FILES / f'{name}.toml'), '-o',
+                     str(folder / f'{name}.yaml')]) == 0
+    return {name: models.coupled_model(load(folder / f'{name}.yaml'), NO_CACHE)
+            for name in ('hollow', 'extras')}
+
+
+def ross_response(model, disc):
+    """Return what ROSS calls horizontal and vertical of a disc, (4, 2), for 1e-4 kg m."""
+    # theory/rotor.md: its phase 0 is our -pi/2, its x our -x
+    unbalance = np.zeros(len(model.planes), dtype=complex)
+    unbalance[0] = 1e-4 * np.exp(-0.5j * np.pi)
+    motion = model.unbalance_response(SPEEDS, unbalance).displacement
+    first = model.channels.index(f'{disc}_x')
+    return motion[:, first:first + 2] * [-1.0, 1.0]
+
+
+@pytest.mark.parametrize('name, speed, expected', [
+    ('hollow', 500.0, HOLLOW_AT_500), ('extras', 300.0, EXTRAS_AT_300)])
+def test_modes_are_those_of_ross(imported, name, speed, expected):
+    found = campbell(imported[name], np.array([speed]), 4).eigenvalue[0]
+    np.testing.assert_allclose(found.real + 1j * np.abs(found.imag), expected, rtol=1e-9)
+
+
+def test_criticals_are_those_of_ross(imported):
+    found = [one.speed for one in critical_speeds(imported['hollow'], (10.0, 1000.0))]
+    np.testing.assert_allclose(found, HOLLOW_CRITICALS, rtol=1e-9)
+
+
+@pytest.mark.parametrize('name, disc, expected', [
+    ('hollow', 'wheel', HOLLOW_RESPONSE['wheel']),
+    ('hollow', 'overhung_fan', HOLLOW_RESPONSE['overhung_fan']),
+    ('extras', 'disk_0', EXTRAS_DISC)])
+def test_response_is_that_of_ross(imported, name, disc, expected):
+    # only with the right signs of cross terms and axes: they reach the small quadrature parts
+    np.testing.assert_allclose(ross_response(imported[name], disc), expected, rtol=1e-8)
+
+
+def test_equal_elements_become_one_section_and_keep_the_mesh(imported):
+    rotor = imported['hollow'].rotor
+    assert [section.elements for section in rotor.shaft] == [2, 4, 1, 2]
+    assert len(rotor.node_positions) == 10
+
+
+def test_bearing_below_a_bearing_is_its_pedestal(imported):
+    [carried, seal, plain] = imported['extras'].rotor.bearings
+    np.testing.assert_array_equal(carried.pedestal.mass, np.diag([4.0, 4.0]))
+    np.testing.assert_array_equal(carried.pedestal.stiffness, np.diag([5e7, 6e7]))
+    assert (seal.name, plain.pedestal) == ('seal_3', None)
+
+
+def changed(tmp_path, *changes):
+    """Return a copy of extras.toml with some text replaced."""
+    text = (FILES / 'extras.toml').read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    (tmp_path / 'changed.toml').write_text(text)
+    return tmp_path / 'changed.toml'
+
+
+@pytest.mark.parametrize('old, new, lost', [
+    ('axial_force = 0\n', 'axial_force = 500.0\n', 'axial_force = 500'),
+    ('torque = 0\n', 'torque = -3\n', 'torque = -3'),
+    ('gyroscopic = true', 'gyroscopic = false', 'gyroscopic = false; our shaft always has them'),
+    ('"cowper"', '"hutchinson"', "shear_method_calc = 'hutchinson'; ours is cowper"),
+    ('beta = 0.0', 'beta = 1e-5', 'beta = 1e-05'),
+    ('kzz = [ 0,]', 'kzz = [ 7.0,]', 'kzz = [7.0]'),
+    ('mxx = [ 0,]', 'mxx = [ 7.0,]', 'mxx = [7.0]'),
+    ('[parameters]\n', '[Strange_thing]\nn = 3\n', 'Strange_thing: is not known here'),
+    ('n_link = 7\n', 'n_link = 9\n', 'n_link = 9, where nothing stands'),
+    ('[parameters]\n', '["ShaftElement_sleeve"]\nL = 0.2\nidl = 0.05\nodl = 0.07\nn = 2\n'
+     'material = {rho = 7810.0, E = 2e11, G_s = 8e10}\n',
+     'stiffness and rotary inertia of a second layer'),
+    ('BearingElement_Bearing 1', 'TiltingPad_Bearing 1',
+     'its geometry; its coefficients are kept'),
+    ('["DiskElement_Disk 0"]', '["GearElement_Disk 0"]', 'its mesh; mass and inertia are kept'),
+])
+def test_what_cannot_be_carried_over_is_said_twice(tmp_path, capsys, old, new, lost):
+    case = tmp_path / 'case.yaml'
+    assert main(['import-ross', str(changed(tmp_path, (old, new))), '-o', str(case)]) == 0
+    said = [line for line in capsys.readouterr().err.splitlines()
+            if line.startswith('not carried over: ') and lost in line]
+    assert len(said) == 1
+    assert said[0].removeprefix('not carried over: ') in case.read_text()
+    load(case)
+
+
+def test_nothing_lost_is_said_too(tmp_path, capsys):
+    assert main(['import-ross', str(FILES / 'hollow.toml'), '-o', str(tmp_path / 'c.yaml')]) == 0
+    assert 'not carried over: nothing\n' in capsys.readouterr().err
+
+
+def test_second_layer_of_a_shaft_is_kept_as_mass(tmp_path):
+    path = changed(tmp_path, (
+        '[parameters]\n', '["ShaftElement_sleeve"]\nL = 0.2\nidl = 0.05\nodl = 0.07\nn = 2\n'
+        'material = {rho = 7810.0, E = 2e11, G_s = 8e10}\n'))
+    shaft = read(path).content['rotor']['shaft']
+    assert [section['elements'] for section in shaft] == [2, 1, 3]
+    assert shaft[1]['added_mass'] == pytest.approx(7810.0 * np.pi / 4.0 * (0.07**2 - 0.05**2))
+
+
+def test_speed_range_may_be_chosen(tmp_path):
+    assert main(['import-ross', str(FILES / 'hollow.toml'), '-o', str(tmp_path / 'c.yaml'),
+                 '--rpm', '600:9000:2']) == 0
+    np.testing.assert_allclose(load(tmp_path / 'c.yaml').speed_range,
+                               [20.0 * np.pi, 300.0 * np.pi])
+
+
+@pytest.mark.parametrize('old, new, problem', [
+    ('L = 0.2\n', '', 'ShaftElement_Shaft Element 0.L: is missing'),
+    ('L = 0.2\n', 'L = "x"\n',
+     "ShaftElement_Shaft Element 0.L: must be a finite number, got 'x'"),
+    ('L = 0.2\n', 'L = nan\n', 'ShaftElement_Shaft Element 0.L: must be a finite number, got nan'),
+    ('L = 0.2\n', 'L = -0.2\n', 'rotor.shaft.0.length: must be > 0 m and finite, got -0.2'),
+    ('n = 1\n', 'n = 0\n', 'has no ShaftElement between nodes 1 and 2: the shaft must be '
+                           'continuous'),
+    ('n = 3\nm = 20.0', 'n = 33\nm = 20.0',
+     'DiskElement_Disk 0.n: must be a node of the shaft, 0 to 6, got 33'),
+    ('n = 0\n', 'n = -1\n', 'ShaftElement_Shaft Element 0.n: must be the number of a node'),
+    ('kxx = [ 10000000.0,]', 'kxx = [ 1.0, 2.0,]',
+     'BearingElement_Bearing 0.frequency: is missing, in rad/s'),
+    ('kxx = [ 10000000.0,]', 'kxx = [ true,]',
+     'BearingElement_Bearing 0.kxx: must be finite numbers in N/m, got True'),
+    ('E = 211000000000.0', 'E = 0.0', 'ShaftElement_Shaft Element 0.material'),
+    ('[parameters]', '[parameters', 'is not TOML: '),
+])
+def test_bad_file_is_one_line_and_status_2(tmp_path, capsys, old, new, problem):
+    path = changed(tmp_path, (old, new))
+    if 'rotor.shaft' not in problem and 'material' in problem:
+        problem = 'rotor.shaft.0.material'
+    assert main(['import-ross', str(path), '-o', str(tmp_path / 'case.yaml')]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f'{path}: {problem}')
+    assert said.count('\n') == 1
+    assert not (tmp_path / 'case.yaml').exists()
+
+
+@pytest.mark.parametrize('content, problem', [
+    (b'', 'holds no ShaftElement; is it a rotor saved by ROSS?'),
+    (b'a = 3\n', 'holds no ShaftElement'), (b'\xff', 'is not a text file in UTF-8 (byte 0)'),
+    (b'"ShaftElement_a" = 3\n', 'holds no ShaftElement')])
+def test_other_file_is_told_in_one_line(tmp_path, content, problem):
+    (tmp_path / 'x.toml').write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path / 'x.toml')
+    assert str(caught.value).startswith(f'{tmp_path / "x.toml"}: {problem}')
+
+
+def test_missing_file_is_told_in_one_line():
+    with pytest.raises(InputError, match=r'^nothing\.toml: cannot be read: No such file'):
+        read(Path('nothing.toml'))

@@ -1,0 +1,46 @@
+"""`make demo`, shortened: a real node and a real replay over DDS."""
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.case.config import load
+from rotorsoil_ros.cli import demo, main
+from rotorsoil_ros.physics.units import rad_s_to_rpm
+
+
+def test_profile_runs_up_dwells_and_coasts_down_inside_the_case():
+    stamp_ns, speed = demo.speed_profile(7)
+    assert stamp_ns[0] == 7
+    speed_rpm = rad_s_to_rpm(speed)
+    assert np.unique(np.diff(stamp_ns)).tolist() == [10_000_000]
+    rising, still, falling = (np.diff(speed) > 1e-9, np.abs(np.diff(speed)) <= 1e-9,
+                              np.diff(speed) < -1e-9)
+    assert rising.sum() == 1200
+    assert still.sum() == 300
+    assert falling.sum() == 899
+    assert np.all(rising[:1200])
+    assert np.all(falling[-899:])
+    low, high = load(demo.files('rotorsoil_ros') / 'config' / 'paper_rotor.yaml').speed_range
+    assert low < speed.min() < speed.max() < high
+    assert speed_rpm[0] == pytest.approx(300.0)
+    assert speed_rpm.max() == pytest.approx(8400.0)
+
+
+def test_demo_leaves_log_recording_and_pictures(tmp_path, monkeypatch, capfd):
+    pytest.importorskip('rerun')
+    for name, seconds in (('_RUN_UP_S', 0.6), ('_DWELL_S', 0.2), ('_COAST_S', 0.4)):
+        monkeypatch.setattr(demo, name, seconds)
+    monkeypatch.setattr(demo, 'all_figures', lambda *_: [])  # test_cli draws them
+    assert main(['demo', '-o', str(tmp_path)]) == 0
+    said = capfd.readouterr().out
+    assert '120 speeds sent over DDS, 120 answered and logged' in said
+    assert {path.name for path in (tmp_path / 'run').iterdir()} == {
+        'metadata.yaml', 'run_0.mcap', 'run.rrd'}
+    assert (tmp_path / 'plots' / 'demo.png').stat().st_size > 10_000
+    assert 'um at' in said
+
+
+def test_replay_that_fails_is_told_with_the_words_of_the_node(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(demo, 'write_speed_profile', lambda path, *_: path.write_bytes(b'junk'))
+    assert main(['demo', '-o', str(tmp_path)]) == 2
+    assert 'the replay failed' in capfd.readouterr().err
