@@ -88,8 +88,7 @@ def summary(directory):
 def judged(log, case=FAN):
     """Return the comparison of a log with a case, without files and pictures."""
     rules = Rules()
-    expectation = Expectation.of(load(Path(case)), Path('no cache is needed for cones'),
-                                 rules.spread)
+    expectation = Expectation.of(load(Path(case)), Path('no cache is needed for cones'))
     return judge(read_run(Path(log), Reading()), expectation, rules)
 
 
@@ -366,7 +365,7 @@ def test_soil_under_infinite_elements_is_identified_on_its_table(tmp_path):
     model = coupled_model(case, tmp_path)
     log = write_vectors(tmp_path / 'log.mcap', factor=0.6, noise=0.05, model=model)
     rules = Rules()
-    found = judge(read_run(Path(log), Reading()), Expectation.of(case, tmp_path, rules.spread),
+    found = judge(read_run(Path(log), Reading()), Expectation.of(case, tmp_path),
                   rules)
     known = identify_case(found, Wanted(scalars=['soil.shear_modulus'], planes=['wheel']),
                           overrides=overrides)

@@ -8,9 +8,9 @@ import math
 import numpy as np
 
 from rotorsoil_ros.case.expectation import Expectation
-from rotorsoil_ros.case.housing_zones import housing_zones, HousingZone
+from rotorsoil_ros.case.housing_zones import HOUSING, housing_zones, HousingZone
+from rotorsoil_ros.case.peak_pairs import peak_fault, peaks_of
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.physics.band import SoilSpread
 from rotorsoil_ros.physics.comparison import (
     ChannelPoints,
     match,
@@ -21,18 +21,11 @@ from rotorsoil_ros.physics.comparison import (
     statistics,
 )
 from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.passages import (
-    pair,
-    Passage,
-    passages,
-    PeakPair,
-    told_once,
-    without_ringing,
-)
+from rotorsoil_ros.physics.passages import PeakPair, told_once
 from rotorsoil_ros.physics.quasistatic import Resonance
 from rotorsoil_ros.physics.soil import require
 from rotorsoil_ros.physics.units import rad_s_to_rpm
-from rotorsoil_ros.physics.zones import ISO_10816_3, ZoneLimits
+from rotorsoil_ros.physics.zones import ISO_10816_3, USUAL_GROUP, ZoneLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +37,6 @@ class Rules:
     ----------
     matching : Matching
         How points are matched and cleaned.
-    spread : SoilSpread
-        How well the soil is known.
     amplitude_margin : float
         Share by which an amplitude may lie outside the band and still count as inside.
     inside_share : float
@@ -59,11 +50,10 @@ class Rules:
     """
 
     matching: Matching = field(default_factory=Matching)
-    spread: SoilSpread = field(default_factory=SoilSpread)
     amplitude_margin: float = 0.10
     inside_share: float = 0.90
     critical_margin: float = 0.05
-    zones: ZoneLimits = ISO_10816_3[2]
+    zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
 
     def __post_init__(self) -> None:
         for name in ('amplitude_margin', 'inside_share', 'critical_margin'):
@@ -199,7 +189,8 @@ def compare(run: Run, expectation: Expectation | None, rules: Rules) -> Comparis
     points = match(run.signals, reference, resonances, rules.matching)
     peaks: list[PeakPair] = []
     for channel in points:
-        found, lobes = _peaks(channel, reference, resonances, rules)
+        found, lobes = peaks_of(
+            channel, reference, resonances, margin=rules.critical_margin)
         peaks += found
         if lobes:
             remarks.append(f'{channel.channel}: smaller peaks after a passage too fast, taken as '
@@ -212,7 +203,7 @@ def compare(run: Run, expectation: Expectation | None, rules: Rules) -> Comparis
         points = match(run.signals, reference, [*resonances, *seen], rules.matching)
     figures = [statistics(channel, margin=rules.amplitude_margin) for channel in points]
     zones = [] if expectation is None else [
-        found for channel in points if '_housing_' in channel.channel
+        found for channel in points if HOUSING in channel.channel
         for found in housing_zones(channel, reference, expectation, limits=rules.zones,
                                    tolerance=rules.matching.tolerance)]
     comparison = Comparison(run, expectation, rules, reference, points, figures, peaks, zones,
@@ -256,23 +247,6 @@ def _numbers(value: object) -> list[float]:
     return []
 
 
-def _peaks(
-    channel: ChannelPoints, reference: Reference, resonances: Sequence[Resonance], rules: Rules,
-) -> tuple[list[PeakPair], list[Passage]]:
-    """Pair the peaks of one channel, found alike on both sides; and tell measured lobes."""
-    time = (channel.stamp_ns - reference.stamp_ns[0]) * 1e-9
-    expected = np.abs(channel.predicted)
-    predicted = passages(time, channel.speed, expected)
-    high = np.where(np.isfinite(channel.high), channel.high, expected)
-    limits = [(1.0 + rules.critical_margin) * float(np.nanmax(np.where(
-        np.abs(channel.speed / peak.speed - 1.0) <= rules.critical_margin, high, np.nan)))
-        for peak in predicted]
-    measured, lobes = without_ringing(
-        passages(time, channel.speed, channel.amplitude), resonances)
-    return pair(channel.channel, predicted, measured, limits=limits,
-                resonances=resonances), lobes
-
-
 def _as_measured(peaks: Sequence[PeakPair]) -> list[Resonance]:
     """Return resonances where peaks were measured, damped as the predicted ones beside them."""
     return [Resonance(end, peak.damping_ratio) for peak in peaks
@@ -287,31 +261,12 @@ def _failures(comparison: Comparison) -> list[str]:
         if figures.inside < rules.inside_share:
             found.append(f'{channel.channel}: {100 * figures.inside:.0f} % of the amplitudes lie '
                          f'inside the band, {100 * rules.inside_share:.0f} % should')
-    found += [line for peak in comparison.peaks if (line := _fault(peak, rules))]
+    found += [line for peak in comparison.peaks if (
+        line := peak_fault(peak, margin=rules.critical_margin))]
     found += [f'{entry.channel}: zone D, {1e3 * entry.velocity:.2f} mm/s rms measured at '
               f'{rad_s_to_rpm(entry.speed):.0f} rpm' for entry in comparison.zones
               if entry.source == 'measured' and entry.zone == 'D' and entry.is_steady]
     return found
-
-
-def _fault(peak: PeakPair, rules: Rules) -> str:
-    """Return what is wrong with a peak; nothing if all is well or nothing can be said."""
-    if peak.measured is None:
-        assert peak.predicted is not None
-        return '' if not peak.is_slow else (
-            f'{peak.channel}: the peak predicted at {rad_s_to_rpm(peak.predicted.speed):.0f} rpm '
-            'was not measured')
-    at = f'{peak.channel}: the peak measured at {rad_s_to_rpm(peak.measured.speed):.0f} rpm'
-    if peak.predicted is None:
-        return f'{at} is not predicted'
-    if abs(peak.deviation) > rules.critical_margin:
-        return (f'{at} is {100 * peak.deviation:+.1f} % from the predicted '
-                f'{rad_s_to_rpm(peak.predicted.speed):.0f} rpm, allowed '
-                f'{100 * rules.critical_margin:.0f} %')
-    if peak.measured.amplitude > peak.limit:
-        return (f'{at} is {1e6 * peak.measured.amplitude:.3g} um high, at most '
-                f'{1e6 * peak.limit:.3g} um predicted')
-    return ''
 
 
 def _remarks(comparison: Comparison) -> list[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from rotorsoil_ros.case.faults import Faults, message
 from rotorsoil_ros.case.rotor_entries import RotorEntries
 from rotorsoil_ros.case.unbalances import Unbalances
 from rotorsoil_ros.physics.arrays import ComplexArray
+from rotorsoil_ros.physics.band import SoilSpread
 from rotorsoil_ros.physics.compliance_table import ComplianceTable
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
@@ -22,6 +23,7 @@ from rotorsoil_ros.physics.infinite_table import require_kind
 from rotorsoil_ros.physics.rotor import Rotor
 from rotorsoil_ros.physics.soil import Circle, Contact, Rectangle, RigidSoil, Soil
 from rotorsoil_ros.physics.units import rpm_to_rad_s
+from rotorsoil_ros.physics.zones import ISO_10816_3, USUAL_GROUP, ZoneLimits
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,10 @@ class Case:
         Lowest and highest rotor speed [rad/s].
     tables : tuple of ComplianceTable
         What each block stands on where a file says it; else empty.
+    uncertainty : SoilSpread
+        How far the soil may be from what the file says.
+    zones : ZoneLimits
+        Of housing velocity.
 
     """
 
@@ -65,6 +71,8 @@ class Case:
     couples: tuple[str, ...]
     speed_range: tuple[float, float]
     tables: tuple[ComplianceTable, ...] = ()
+    uncertainty: SoilSpread = field(default_factory=SoilSpread)
+    zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
 
 
 # Natural modes above the running speed and excitation at twice the speed need the soil too.
@@ -141,7 +149,8 @@ class _Builder:
             name=entries.name, path=self.faults.path, soil=soil, support=entries.support,
             foundations=self._foundations(rotor), rotor=rotor, unbalance=unbalances.total(),
             couples=unbalances.couples(), speed_range=speed_range,
-            tables=self._tables(speed_range))
+            tables=self._tables(speed_range), uncertainty=self._uncertainty(),
+            zones=self._zones())
         with self.faults.at('rotor', entry=entries.rotor):
             CoupledModel(rotor, case.foundations, [RigidSoil() for _ in case.foundations])
         self._refuse_unreachable_soil(case)
@@ -226,6 +235,27 @@ class _Builder:
             return Rectangle(width, length)
         raise self.faults.error('foundations', index, problem='needs either half_width and '
                                                               'half_length or radius, in m')
+
+    def _uncertainty(self) -> SoilSpread:
+        entry = self.faults.entries.uncertainty
+        given = {} if entry is None else entry.model_dump(exclude_none=True)
+        with self.faults.at('uncertainty', entry=entry):
+            return SoilSpread(**given)
+
+    def _zones(self) -> ZoneLimits:
+        """Return the limits of a group, or those that the file gives itself."""
+        entry = self.faults.entries.zones or schema.Zones()
+        own = entry.label, entry.rigid, entry.flexible
+        if entry.group is not None and own != (None, None, None):
+            raise self.faults.error('zones', problem='needs either group, or label, rigid and '
+                                                     'flexible, got both')
+        label, rigid, flexible = own
+        if label is None and rigid is None and flexible is None:
+            return ISO_10816_3[entry.group or USUAL_GROUP]
+        if label is None or rigid is None or flexible is None:
+            raise self.faults.error('zones', problem='needs label, rigid and flexible together')
+        with self.faults.at('zones', entry=entry):
+            return ZoneLimits(label, rigid, flexible)
 
     def _speed_range(self) -> tuple[float, float]:
         low, high = self.faults.entries.speed_range_rpm

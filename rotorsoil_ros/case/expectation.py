@@ -47,6 +47,8 @@ class Expectation:
         Where omega = Omega, a little beyond the speed range.
     band : ResponseBand or None
         Its response on other soils; None on a support that knows of no soil.
+    spread : SoilSpread
+        How far those are from the one of the case.
 
     """
 
@@ -55,10 +57,14 @@ class Expectation:
     table: ResponseTable
     modes: tuple[CriticalSpeed, ...]
     band: ResponseBand | None
+    spread: SoilSpread
 
     @classmethod
-    def of(cls, case: Case, directory: Path, spread: SoilSpread) -> 'Expectation':
-        """Solve a case, with tables out of a cache, on its soil and on all of a spread."""
+    def of(
+        cls, case: Case, directory: Path, spread: SoilSpread | None = None,
+    ) -> 'Expectation':
+        """Solve a case, with tables out of a cache, on its soil and all of its spread."""
+        spread = spread or case.uncertainty
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
@@ -68,7 +74,7 @@ class Expectation:
                 case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
             band = ResponseBand.build(table, on_soils(model, soils[1:]))
         modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
-        return cls(case, model, table, modes, band)
+        return cls(case, model, table, modes, band, spread)
 
     @property
     def criticals(self) -> tuple[CriticalSpeed, ...]:

@@ -11,8 +11,11 @@ from rotorsoil_ros.physics.comparison import ChannelPoints, nearest, Reference
 from rotorsoil_ros.physics.quasistatic import speed_rate
 from rotorsoil_ros.physics.zones import support_class, SupportClass, Zone, zone, ZoneLimits
 
+# What is in the name of a channel of a housing.
+HOUSING = '_housing_'
+
 # Slower than this share of itself per second a speed counts as constant [1/s].
-_STEADY = 0.005
+STEADY = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,7 @@ def housing_zones(
     """
     index = nearest(channel.stamp_ns, reference.stamp_ns, tolerance=tolerance)
     rate = speed_rate(reference.time, reference.speed)[index]
-    steady = np.isfinite(channel.speed) & (np.abs(rate) <= _STEADY * np.abs(channel.speed))
+    steady = np.isfinite(channel.speed) & (np.abs(rate) <= STEADY * np.abs(channel.speed))
     natural = expectation.lowest_natural_speed(channel.channel[-1])
     found = [_worst(channel, source, amplitude, steady, natural=natural, limits=limits)
              for source, amplitude in (('predicted', np.abs(channel.predicted)),

@@ -4,7 +4,15 @@ from collections.abc import Hashable
 import difflib
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Discriminator, model_validator, Tag, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    model_validator,
+    StringConstraints,
+    Tag,
+    ValidationError,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from rotorsoil_ros.case.document import shown
@@ -18,6 +26,7 @@ from rotorsoil_ros.case.quantities import (
     KilogramPerMetre,
     KilogramSquareMetre,
     Metre,
+    MetrePerSecond,
     Name,
     NewtonPerMetre,
     NewtonSecondPerMetre,
@@ -231,6 +240,27 @@ class Unbalance(Entry):
     couple_phase: Radian = 0.0
 
 
+class Uncertainty(Entry):
+    """How far the soil may be from what the file says."""
+
+    shear_modulus_factor: Ratio | None = None
+    poisson_ratio: Ratio | None = None
+    loss_factor: Ratio | None = None
+    samples: Count | None = None
+
+
+Velocities: TypeAlias = tuple[MetrePerSecond, MetrePerSecond, MetrePerSecond]
+
+
+class Zones(Entry):
+    """Limits of housing velocity: those of a group of the standard, or one's own."""
+
+    group: Literal[1, 2] | None = None
+    label: Annotated[str, StringConstraints(min_length=1, max_length=64)] | None = None
+    rigid: Velocities | None = None
+    flexible: Velocities | None = None
+
+
 class Document(Entry):
     """The whole file."""
 
@@ -241,6 +271,8 @@ class Document(Entry):
     rotor: Rotor
     unbalances: list[Unbalance] = []
     speed_range_rpm: tuple[Rpm, Rpm]
+    uncertainty: Uncertainty | None = None
+    zones: Zones | None = None
 
 
 _WHAT = {

@@ -3,6 +3,7 @@
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 import csv
+from dataclasses import replace
 from importlib.resources import as_file, files
 import io
 import json
@@ -13,7 +14,7 @@ from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.comparison import compare as judge, Comparison, Rules, Run, Verdict
 from rotorsoil_ros.case.comparison_files import document, HEADER, rows
 from rotorsoil_ros.case.comparison_plots import all_figures
-from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.expectation import Expectation
 from rotorsoil_ros.case.report import (
     channel_table,
@@ -27,7 +28,7 @@ from rotorsoil_ros.physics.band import SoilSpread
 from rotorsoil_ros.physics.comparison import Matching
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
 from rotorsoil_ros.physics.units import rpm_to_rad_s
-from rotorsoil_ros.physics.zones import ISO_10816_3
+from rotorsoil_ros.physics.zones import ISO_10816_3, USUAL_GROUP
 
 _VERDICT_FAILS = 1
 _DPI = 110
@@ -37,12 +38,11 @@ def compare(arguments: Namespace) -> int:
     """Hold a log against its prediction; write tables, pictures and a report; print a verdict."""
     from rotorsoil_ros.live.measured_log import read_run, Reading
 
-    rules = _rules(arguments)
     with progress('reading') as _:
         run = read_run(arguments.log, Reading(machine=arguments.machine or ''))
     with progress('solving') as _:
-        expectation = _expectation(arguments, run, rules)
-        comparison = judge(run, expectation, rules)
+        expectation = _expectation(arguments, run)
+        comparison = judge(run, expectation, _rules(arguments, expectation))
     lines = list(_identification(arguments, comparison))
     out: Path = arguments.output
     out.mkdir(parents=True, exist_ok=True)
@@ -56,22 +56,25 @@ def compare(arguments: Namespace) -> int:
     return 0 if comparison.verdict == Verdict.PASSES else _VERDICT_FAILS
 
 
-def _rules(arguments: Namespace) -> Rules:
-    slow_roll = arguments.slow_roll_rpm
+def _rules(arguments: Namespace, expectation: Expectation | None) -> Rules:
+    slow_roll, group = arguments.slow_roll_rpm, arguments.zone_group
+    zones = ISO_10816_3[group or USUAL_GROUP]
+    if expectation is not None and group is None:
+        zones = expectation.case.zones
     return Rules(
         matching=Matching(
             tolerance=arguments.tolerance_s,
             slow_roll_speed=math.nan if slow_roll is None else rpm_to_rad_s(slow_roll),
             noise=1e-6 * arguments.noise_um),
-        spread=SoilSpread(shear_modulus_factor=arguments.soil_factor),
-        amplitude_margin=arguments.margin, zones=ISO_10816_3[arguments.zone_group])
+        amplitude_margin=arguments.margin, zones=zones)
 
 
-def _expectation(arguments: Namespace, run: Run, rules: Rules) -> Expectation | None:
+def _expectation(arguments: Namespace, run: Run) -> Expectation | None:
     """Return the case that is given, or the one of the package that the log was answered with."""
     directory = cache.directory(arguments.cache)
     if arguments.case is not None:
-        return Expectation.of(load(arguments.case, arguments.overrides), directory, rules.spread)
+        case = load(arguments.case, arguments.overrides)
+        return Expectation.of(case, directory, _spread(arguments, case))
     if arguments.overrides:
         raise InputError('--set: needs the CASE that it overrides')
     name, tables = run.description.get('case'), run.description.get('tables')
@@ -84,7 +87,13 @@ def _expectation(arguments: Namespace, run: Run, rules: Rules) -> Expectation | 
         key = models.response_key(case, models.coupled_model(case, directory))
         if key != tables.get('response'):
             return None
-        return Expectation.of(case, directory, rules.spread)
+        return Expectation.of(case, directory, _spread(arguments, case))
+
+
+def _spread(arguments: Namespace, case: Case) -> SoilSpread:
+    factor = arguments.soil_factor
+    return case.uncertainty if factor is None else replace(
+        case.uncertainty, shear_modulus_factor=factor)
 
 
 def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[str]:

@@ -235,12 +235,12 @@ def _add_compare(verbs: _Verbs) -> None:
         help='speed whose vector is runout and is subtracted [rpm]')
     add('--noise-um', metavar='A', type=_positive, default=0.0,
         help='amplitude below which nothing is compared [um] (default: %(default)s)')
-    add('--soil-factor', metavar='F', type=_positive, default=2.0,
-        help='G lies within this factor of the case (default: %(default)s)')
+    add('--soil-factor', metavar='F', type=_positive,
+        help='G lies within this factor of the case (default: what the case says, or 2)')
     add('--margin', metavar='M', type=_positive, default=0.10,
         help='share by which an amplitude may leave the band (default: %(default)s)')
-    add('--zone-group', type=int, choices=(1, 2), default=2,
-        help='group of ISO 10816-3:2009, 1 above 300 kW (default: %(default)s)')
+    add('--zone-group', type=int, choices=(1, 2),
+        help='group of ISO 10816-3:2009, 1 above 300 kW (default: what the case says, or 2)')
     add('--identify-unbalance', action='store_true',
         help='print the unbalance that explains the run best')
     add('--identify', metavar='KEY.PATH', action='append', default=[],

@@ -19,7 +19,7 @@ from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE, Records, STRING
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.comparison import nearest, Signal
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
-from rotorsoil_ros.physics.orders import order_vectors, OrderVector, SpeedTrack
+from rotorsoil_ros.physics.orders import order_vectors, OrderVector, SpeedTrack, turns_with
 
 IMU = 'sensor_msgs/msg/Imu'
 SYNTHETIC = 'synthetic'  # begins the frame of every signal that no sensor measured
@@ -277,7 +277,7 @@ def _demodulated(
     samples_ns = np.concatenate([stamps for stamps, _ in parts])
     values = np.concatenate([rows for _, rows in parts])[:, AXES.index(axis)]
     inside = (samples_ns >= stamp_ns[0]) & (samples_ns <= stamp_ns[-1]) & np.isfinite(values)
-    told = np.isfinite(angle).all()
+    told = turns_with((stamp_ns - stamp_ns[0]) / NANOSECONDS, speed, angle)
     track = SpeedTrack((stamp_ns - stamp_ns[0]) / NANOSECONDS, speed,
                        angle=angle if told else None)
     if not inside.any():

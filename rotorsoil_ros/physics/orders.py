@@ -19,6 +19,11 @@ _SAMPLES_PER_UNKNOWN = 2
 _WORST_CONDITION = 1e6
 
 
+# An angle that strays further from what the speed says between two samples is not the rotor's
+# [rad]; chance would give a quarter of a turn.
+_ASTRAY = 0.5
+
+
 @dataclass(frozen=True, slots=True)
 class SpeedTrack:
     """
@@ -84,6 +89,26 @@ class SpeedTrack:
         since = time - self.time[index]
         angle = start[index] + (self.speed[index] + 0.5 * rate[index] * since) * since
         return angle, self.speed[index] + rate[index] * since, rate[index]
+
+
+def turns_with(time: FloatArray, speed: FloatArray, angle: FloatArray) -> bool:
+    """
+    Return whether angles are those of a rotor at these speeds.
+
+    Many publishers fill in a zero, or a position that nobody measures, where the angle of the
+    rotor should be: its phases would look true.
+
+    Parameters
+    ----------
+    time, speed, angle : (n,) float arrays
+        Ascending [s], [rad/s], and [rad] with or without whole turns.
+
+    """
+    if len(time) < 2 or not np.all(np.isfinite(angle)):
+        return False
+    turned = 0.5 * (speed[:-1] + speed[1:]) * np.diff(time)
+    astray = np.abs(np.angle(np.exp(1j * (np.diff(angle) - turned))))
+    return float(np.median(astray)) < _ASTRAY
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,14 +191,15 @@ def demodulate(
         columns += [value.real, -value.imag, change.real, -change.imag]
     system = np.column_stack([*columns, np.ones_like(time)])
     scale = np.linalg.norm(system, axis=0)
-    solution, _, rank, singular = np.linalg.lstsq(system / scale, acceleration, rcond=None)
-    if rank < unknowns or singular[0] > _WORST_CONDITION * singular[-1]:
+    left, singular, right = np.linalg.svd(system / scale, full_matrices=False)
+    if not singular[0] <= _WORST_CONDITION * singular[-1]:
         raise NotSolvedError('the samples cannot tell the orders apart')
-    residual = acceleration - system @ (solution / scale)
+    inverse = right.T / singular / scale[:, None]
+    solution = inverse @ (left.T @ acceleration)
+    residual = acceleration - system @ solution
     variance = residual @ residual / (len(time) - unknowns)
-    covariance = np.linalg.pinv(system.T @ system)
-    vectors = (solution / scale)[:-1].reshape(-1, 4)
-    spread = np.diagonal(covariance)[:-1].reshape(-1, 4)[:, :2].max(axis=1)
+    vectors = solution[:-1].reshape(-1, 4)
+    spread = np.sum(inverse**2, axis=1)[:-1].reshape(-1, 4)[:, :2].max(axis=1)
     return OrderVector(
         middle, float(track.at(np.array([middle]))[1][0]), vectors[:, 0] + 1j * vectors[:, 1],
         np.sqrt(variance * spread), track.has_phase)

@@ -51,6 +51,7 @@ ISO_10816_3 = {
     2: ZoneLimits('ISO 10816-3:2009 group 2', (1.4e-3, 2.8e-3, 4.5e-3),
                   (2.3e-3, 4.5e-3, 7.1e-3)),
 }
+USUAL_GROUP = 2
 
 
 def zone(velocity_rms: float, limits: tuple[float, float, float]) -> Zone:
