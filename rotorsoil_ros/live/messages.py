@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 import json
 import struct
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
@@ -26,8 +27,7 @@ NODE_NAME = 'rotorsoil'
 pack_stamp = struct.Struct('=iI').pack  # in the order of this machine, as rclpy does
 
 
-@dataclass(frozen=True, slots=True)
-class Records:
+class Records(NamedTuple):
     """Messages of one topic as they travel and as they are logged: their times [ns] and CDR."""
 
     topic: str
@@ -53,39 +53,20 @@ class Topics:
         return cls(f'{own}/amplitude', f'{own}/phase', f'{own}/model')
 
 
-class Vectors:
-    """
-    Displacement, velocity and force of a prediction, taken apart into moduli and phases.
+def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
+    """Return zero-to-peak values: displacement and force (n, 2, c), and velocity (n, c)."""
+    # Bitwise the same for one speed and for many, which `np.abs` of complex numbers is not: it
+    # may take another path for the tail of an array than for its body.
+    squares = prediction.parts * prediction.parts
+    sizes: FloatArray = np.sqrt(squares[:, 0] + squares[:, 1])
+    return sizes, sizes[:, 0] * prediction.speed[:, None]
 
-    Bitwise the same for one speed and for many: separate ufuncs on contiguous arrays, because
-    `np.abs` and strided views may take another path for the tail of an array than for its
-    body. The velocity i speed X has its phase from i X, without wrapping.
-    """
 
-    def __init__(self, prediction: Prediction) -> None:
-        displacement, force = prediction.displacement, prediction.force
-        shape = (len(displacement), 3, displacement.shape[1])
-        real, imag = np.empty(shape), np.empty(shape)
-        real[:, 0], imag[:, 0] = displacement.real, displacement.imag
-        np.negative(imag[:, 0], out=real[:, 1])
-        imag[:, 1] = real[:, 0]
-        real[:, 2], imag[:, 2] = force.real, force.imag
-        self._speed, self._real, self._imag = prediction.speed, real, imag
-
-    @property
-    def moduli(self) -> FloatArray:
-        """Zero-to-peak values, (n, 3, channels)."""
-        moduli = self._real * self._real
-        moduli += self._imag * self._imag
-        np.sqrt(moduli, out=moduli)
-        np.multiply(moduli[:, 0], self._speed[:, None], out=moduli[:, 1])
-        return moduli
-
-    @property
-    def phases(self) -> FloatArray:
-        """Phases in [-pi, pi] [rad], (n, 3, channels)."""
-        phases: FloatArray = np.arctan2(self._imag, self._real)
-        return phases
+def phases(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
+    """Return phases in [-pi, pi] [rad]: displacement and force, and velocity, as of i X."""
+    parts = prediction.parts
+    real, imag = parts[:, 0], parts[:, 1]
+    return np.arctan2(imag, real), np.arctan2(real[:, 0], -imag[:, 0])
 
 
 class JointStateWriter:
@@ -113,14 +94,20 @@ class JointStateWriter:
 
     def write(self, stamp_ns: Sequence[int], values: FloatArray) -> list[bytes]:
         """Return n messages; values are (n, 3, names): position, velocity, effort, or NaN."""
-        numbers, width = values.tobytes(), self._width
+        return self.write_parts(stamp_ns, values[:, ::2], values[:, 1])
+
+    def write_parts(
+        self, stamp_ns: Sequence[int], outer: FloatArray, velocity: FloatArray,
+    ) -> list[bytes]:
+        """Return n messages of position and effort, (n, 2, names), and velocity, (n, names)."""
+        ends, middle, width = outer.tobytes(), velocity.tobytes(), self._width
         front, names, to_velocity, to_effort, tail = self._between
         written, start = [], 0
         for stamp in stamp_ns:
-            velocity, effort, stop = start + width, start + 2 * width, start + 3 * width
+            effort, stop = 2 * start + width, start + width
             written.append(b''.join((
-                front, pack_stamp(*divmod(stamp, NANOSECONDS)), names, numbers[start:velocity],
-                to_velocity, numbers[velocity:effort], to_effort, numbers[effort:stop], tail)))
+                front, pack_stamp(*divmod(stamp, NANOSECONDS)), names, ends[2 * start:effort],
+                to_velocity, middle[start:stop], to_effort, ends[effort:2 * stop], tail)))
             start = stop
         return written
 
@@ -145,11 +132,12 @@ class Encoder:
                 yield Records(self._topics.model, STRING, [stamp_ns], [payload], latched=True)
 
     def _predicted(self, event: Predicted) -> Iterator[Records]:
-        stamps, write = event.stamp_ns.tolist(), self._joint_states.write
-        vectors, topics = Vectors(event.prediction), self._topics
+        stamps, topics = event.stamp_ns.tolist(), self._topics
+        write = self._joint_states.write_parts
         # The amplitude is under way before the phase is even computed.
-        yield Records(topics.amplitude, JOINT_STATE, stamps, write(stamps, vectors.moduli))
-        yield Records(topics.phase, JOINT_STATE, stamps, write(stamps, vectors.phases))
+        yield Records(topics.amplitude, JOINT_STATE, stamps,
+                      write(stamps, *moduli(event.prediction)))
+        yield Records(topics.phase, JOINT_STATE, stamps, write(stamps, *phases(event.prediction)))
 
 
 def diagnostic_array(event: Diagnostics) -> DiagnosticArray:

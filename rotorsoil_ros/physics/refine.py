@@ -1,5 +1,6 @@
 """The pieces into which a sharp function is cut so that polynomials can stand for it."""
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -62,6 +63,27 @@ class Pieces:
         edges, pieces = self._search
         return pieces[np.searchsorted(edges, place, side='right')]
 
+    @cached_property
+    def _plain(self) -> tuple[list[float], list[int], list[float]]:
+        """Return what `_search` says and all edges, as plain numbers."""
+        edges, pieces = self._search
+        return edges.tolist(), pieces.tolist(), self.edges.tolist()
+
+    def find_one(self, place: float) -> int:
+        """Return what `find` says of a single place, at a tenth of the cost."""
+        edges, pieces, _ = self._plain
+        return pieces[bisect_right(edges, place)]
+
+    def powers_of_one(self, place: float, piece: int) -> list[float]:
+        """Return the squared place times the powers of where it is in its piece."""
+        edges = self._plain[2]
+        left, right = edges[piece], edges[piece + 1]
+        along = ((place - left) - (right - place)) / (right - left)
+        powers = [place * place]
+        for degree in range(DEGREE):
+            powers.append(powers[degree] * along)
+        return powers
+
 
 def evaluate(
     pieces: Pieces, coefficients: FloatArray, place: FloatArray, index: IntArray,
@@ -92,12 +114,16 @@ def evaluate(
     np.multiply(place, place, out=powers[0])
     powers[1:] = ((place - left) - (right - place)) / (right - left)
     np.multiply.accumulate(powers, axis=0, out=powers)
-    if len(place) == 1:  # the live node: nothing to sort
-        return _sum(powers, coefficients[index[0]])
     values = np.empty((len(place), coefficients.shape[2]))
     for piece, run in _runs(index):
         values[run] = _sum(powers[:, run], coefficients[piece])
     return values
+
+
+def evaluate_one(pieces: Pieces, coefficients: FloatArray, place: float, piece: int) -> FloatArray:
+    """Evaluate at a single place, (1, w): the bits of `evaluate`, but few calls of numpy."""
+    powers = np.array(pieces.powers_of_one(place, piece))
+    return _sum(powers[:, None], coefficients[piece])
 
 
 def _sum(powers: FloatArray, rows: FloatArray) -> FloatArray:

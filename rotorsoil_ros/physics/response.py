@@ -8,7 +8,7 @@ from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.physics.prediction import Prediction
-from rotorsoil_ros.physics.refine import evaluate, Pieces, refine
+from rotorsoil_ros.physics.refine import evaluate, evaluate_one, Pieces, refine
 from rotorsoil_ros.physics.units import rad_s_to_rpm
 
 __all__ = ['TOLERANCE', 'Prediction', 'Predictor', 'ResponseTable']
@@ -135,10 +135,10 @@ class ResponseTable:
         weighted = np.einsum('kdpc,p->kdc', self.pieces.coefficients, unbalance)
         moving = len(self.channels)
         # NaN where no force is transmitted: it stays NaN in every sum, at no further cost.
-        coefficients = np.full((*weighted.shape[:2], 2 * moving), complex(np.nan, np.nan))
-        coefficients[..., :moving] = weighted[..., :moving]
-        coefficients[..., moving:][..., self.transmits_force] = weighted[..., moving:]
-        return Predictor(self, coefficients.view(float))
+        vectors = np.full((*weighted.shape[:2], 2 * moving), complex(np.nan, np.nan))
+        vectors[..., :moving] = weighted[..., :moving]
+        vectors[..., moving:][..., self.transmits_force] = weighted[..., moving:]
+        return Predictor(self, np.concatenate([vectors.real, vectors.imag], axis=-1))
 
     def measure(self, model: CoupledModel) -> float:
         """Return the largest deviation from the exact solution at speeds not yet seen."""
@@ -192,7 +192,7 @@ class Predictor:
     table : ResponseTable
         What is looked up.
     coefficients : (k, degree + 1, 4 c) float array
-        Real and imaginary parts of all channels, then of all forces.
+        Real parts of all channels and of all forces, then their imaginary parts.
 
     """
 
@@ -229,18 +229,29 @@ class Predictor:
 
         """
         speed = np.asarray(speed, dtype=float)
-        index = self.table.pieces.find(speed)
+        # A single one is what the live node asks, message by message.
+        rows = self._row(float(speed[0])) if len(speed) == 1 else self._rows(speed)
+        return Prediction.of_parts(speed, rows.reshape(len(speed), 2, 2, len(self.channels)))
+
+    def _row(self, speed: float) -> FloatArray:
+        pieces = self.table.pieces
+        index = pieces.find_one(speed)
+        if index < 0:
+            raise self._not_covered(speed)
+        return evaluate_one(pieces, self.coefficients, speed, index)
+
+    def _rows(self, speed: FloatArray) -> FloatArray:
+        pieces, rows = self.table.pieces, np.empty((len(speed), self.coefficients.shape[2]))
+        index = pieces.find(speed)
         if index.min(initial=0) < 0:
-            low, high = self.table.speed_range
-            raise OutOfTableError(
-                f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and '
-                f'off undamped resonances, got {rad_s_to_rpm(float(speed[index < 0][0])):g} rpm')
-        if len(speed) <= _BLOCK:
-            rows = evaluate(self.table.pieces, self.coefficients, speed, index)
-        else:
-            rows = np.concatenate([
-                evaluate(self.table.pieces, self.coefficients, speed[start:start + _BLOCK],
-                         index[start:start + _BLOCK]) for start in range(0, len(speed), _BLOCK)])
-        response = rows.view(complex)
-        moving = len(self.channels)
-        return Prediction(speed, response[:, :moving], response[:, moving:])
+            raise self._not_covered(float(speed[index < 0][0]))
+        for start in range(0, len(speed), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            rows[block] = evaluate(pieces, self.coefficients, speed[block], index[block])
+        return rows
+
+    def _not_covered(self, speed: float) -> OutOfTableError:
+        low, high = self.table.speed_range
+        return OutOfTableError(
+            f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and off '
+            f'undamped resonances, got {rad_s_to_rpm(speed):g} rpm')

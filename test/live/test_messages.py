@@ -15,8 +15,9 @@ from rotorsoil_ros.live.messages import (
     diagnostic_array,
     Encoder,
     JointStateWriter,
+    moduli,
+    phases,
     Topics,
-    Vectors,
 )
 from rotorsoil_ros.physics.prediction import Prediction
 
@@ -93,12 +94,24 @@ def test_amplitude_and_phase_carry_displacement_velocity_and_force():
 
 @pytest.mark.parametrize('count', [2, 7, 64, 1000])
 def test_one_speed_gives_the_bits_that_many_give(count):
-    many = random_prediction(count, 18)
-    size, angle = Vectors(many).moduli, Vectors(many).phases
+    encoder = Encoder(NAMES, Topics.of('', 'm'))
+    many = [records.payloads for records in encoder.encode(event(count))]
+    prediction = random_prediction(count, len(NAMES))
     for row in range(count):
-        one = Vectors(rows_of(many, slice(row, row + 1)))
-        assert one.moduli.tobytes() == size[row].tobytes()
-        assert one.phases.tobytes() == angle[row].tobytes()
+        one = encoder.encode(Predicted(
+            'm', np.array([STAMP + row]), rows_of(prediction, slice(row, row + 1))))
+        assert [records.payloads for records in one] == [[found[row]] for found in many]
+
+
+@pytest.mark.parametrize('width', [1, 5, 8, 18, 31])
+def test_moduli_and_phases_do_not_depend_on_the_neighbours(width):
+    many = random_prediction(100, width)
+    for fill in (moduli, phases):
+        together = fill(many)
+        for row in range(100):
+            for one, all_of_them in zip(
+                    fill(rows_of(many, slice(row, row + 1))), together, strict=True):
+                assert one.tobytes() == all_of_them[row].tobytes()
 
 
 def test_a_measurement_needs_no_message_because_it_came_as_one():

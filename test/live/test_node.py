@@ -22,7 +22,7 @@ from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.live import bag_reader
-from rotorsoil_ros.live.messages import Vectors
+from rotorsoil_ros.live.messages import moduli, phases
 from rotorsoil_ros.live.node import RotorsoilNode
 
 STAMP = 1_700_000_000_000_000_001
@@ -123,10 +123,11 @@ def exact(machine, speed, unbalance=None):
 
 
 def assert_answers(amplitude, phase, prediction):
-    sizes, angles = Vectors(prediction).moduli, Vectors(prediction).phases
-    for number, name in enumerate(('position', 'velocity', 'effort')):
-        np.testing.assert_array_equal(getattr(amplitude, name), sizes[0, number])
-        np.testing.assert_array_equal(getattr(phase, name), angles[0, number])
+    for message, (outer, velocity) in (
+            (amplitude, moduli(prediction)), (phase, phases(prediction))):
+        np.testing.assert_array_equal(message.position, outer[0, 0])
+        np.testing.assert_array_equal(message.velocity, velocity[0])
+        np.testing.assert_array_equal(message.effort, outer[0, 1])
 
 
 def test_a_speed_is_answered_with_the_bits_of_the_table_and_its_own_stamp(bench, machine):

@@ -50,7 +50,7 @@ def predicted(machine, speeds, start=START, period=PERIOD):
     predictor = machine.table.predictor(machine.case.unbalance)
     known = predictor.covers(speed)
     prediction = predictor.predict(np.where(known, speed, 300.0))
-    prediction.displacement[~known] = complex(np.nan, np.nan)
+    prediction.parts[~known] = np.nan
     return Predicted('fan', start + period * np.arange(len(speed)), prediction)
 
 

@@ -104,6 +104,22 @@ def test_look_up_does_not_depend_on_how_speeds_are_divided(table):
         np.testing.assert_array_equal(alone.force[0], together.force[index])
 
 
+def test_a_single_speed_is_found_where_many_are(table):
+    low, high = table.speed_range
+    edges = table.pieces.edges
+    speed = np.concatenate([
+        edges, np.nextafter(edges, low), np.nextafter(edges, high), [0.5 * (low + high)],
+        [-1.0, -np.inf, np.inf, np.nan, np.nextafter(low, 0.0), np.nextafter(high, np.inf)]])
+    assert [table.pieces.find_one(one) for one in speed.tolist()] == (
+        table.pieces.find(speed).tolist())
+
+
+def test_what_a_prediction_gives_out_is_a_copy_that_says_so(table):
+    answer = table.predictor(np.ones(len(table.planes))).predict(np.array([300.0]))
+    with pytest.raises(ValueError, match='read-only'):
+        answer.displacement[0] = 0.0
+
+
 def test_unbalance_of_two_planes_adds_up_as_vectors(table, machine):
     speed = np.array([300.0])
     whole = table.predictor(UNBALANCE).predict(speed).displacement
