@@ -19,6 +19,11 @@ _ENTRIES = {f'{row}{column}': (i, j) for i, row in enumerate(DOFS)
 _LARGEST_BYTES = 32 * 1024 * 1024
 
 
+# Between two frequencies a smooth curve may swing so far below no loss, of its diagonal, and so
+# many places are looked at: four printed digits make less, a jump makes more.
+_SWING = 1e-3
+_PLACES = 8
+
 # Of a frequency: 1 Hz and 60 rpm differ in the last digit.
 _ROUND_OFF = 1e-12
 
@@ -56,7 +61,11 @@ def read(path: Path, covering: tuple[float, float]) -> ComplianceTable:
         unit = np.broadcast_to(np.eye(len(free)), part.shape)
         compliance[np.ix_(np.arange(len(omega)), free, free)] = np.linalg.solve(part, unit)
         # Solving leaves round-off between ij and ji.
-        return ComplianceTable(omega, 0.5 * (compliance + compliance.swapaxes(1, 2)))
+        table = ComplianceTable(omega, 0.5 * (compliance + compliance.swapaxes(1, 2)))
+        _require_passive_curve(path, table, free)
+        return table
+    except InputError:
+        raise
     except np.linalg.LinAlgError as error:
         raise InputError(f'{path}: the stiffness of a dof that has columns must not be zero') \
             from error
@@ -191,6 +200,22 @@ def _require_passivity(path: Path, stiffness: ComplexArray, omega: FloatArray) -
         raise InputError(f'{path}: must not give energy (imaginary part positive semidefinite), '
                          f'got an eigenvalue of {loss[worst]:g} of the diagonal at '
                          f'{omega[worst]:g} rad/s')
+
+
+def _require_passive_curve(path: Path, table: ComplianceTable, free: IntArray) -> None:
+    """Refuse what loses energy at its frequencies but gives some on the way between them."""
+    share = np.arange(1, _PLACES) / _PLACES
+    between = (table.omega[:-1, None] + np.diff(table.omega)[:, None] * share).ravel()
+    values = table.compliance(between)[:, free[:, None], free]
+    loss = np.linalg.eigvalsh(-values.imag / _units(table.values[:, free[:, None], free]))[:, 0]
+    worst = int(loss.argmin())
+    if not loss[worst] >= -_SWING:
+        below = int(np.searchsorted(table.omega, between[worst])) - 1
+        first, last = rad_s_to_hz(table.omega[below]), rad_s_to_hz(table.omega[below + 1])
+        raise InputError(
+            f'{path}: changes too abruptly for a smooth curve through its {len(table.omega)} '
+            f'frequencies: between {first:.6g} and {last:.6g} Hz the ground would give energy; '
+            'add frequencies there, or mend the jump')
 
 
 def _units(stiffness: ComplexArray) -> FloatArray:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.physics.errors import NotSolvedError
 from rotorsoil_ros.physics.foundation import Foundation
 from rotorsoil_ros.physics.soil import DOFS, equivalent_radii, Rectangle, Soil, SoilModel
 from rotorsoil_ros.physics.units import rad_s_to_rpm
@@ -83,6 +84,14 @@ def warnings(case: Case) -> Iterator[str]:
                    'that about both others, which no body has')
         if case.soil is not None and case.support.model != 'rigid':
             yield from _of_soil(case, case.soil, foundation)
+
+
+def undecided(case: Case, error: NotSolvedError) -> str:
+    """Return why modes are not known, with what a user may do where a file is the reason."""
+    if case.support.model != 'table':
+        return str(error)
+    return (f'support.file: {error}; modes need a stiffness that follows one smooth curve: give '
+            'it at more frequencies, or without jumps (the response needs no modes)')
 
 
 def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:

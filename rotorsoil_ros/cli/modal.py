@@ -1,16 +1,20 @@
 """Natural frequencies and critical speeds, as CSV."""
 
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+import math
+import sys
 
 from rotorsoil_ros.case import cache, models
-from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import opened, values
 from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.physics.errors import InputError, NotSolvedError
 from rotorsoil_ros.physics.modes import campbell as campbell_of, critical_speeds, CriticalSpeed
-from rotorsoil_ros.physics.units import rpm_to_rad_s
+from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
 
 def campbell(arguments: Namespace) -> int:
@@ -18,14 +22,19 @@ def campbell(arguments: Namespace) -> int:
     case = load(arguments.case, arguments.overrides)
     model = models.coupled_model(case, cache.directory(arguments.cache))
     if arguments.criticals:
-        return _criticals(arguments, model, case.speed_range)
+        with _naming(case):
+            return _criticals(arguments, model, case.speed_range)
     if arguments.rpm is None:
         raise InputError('--rpm is missing; only --criticals has the speed range of the case')
     if arguments.running is not None:
         raise InputError('--running needs --criticals')
     speed = rpm_to_rad_s(values(arguments.rpm))
-    with progress('solving') as _:
+    with _naming(case), progress('solving') as _:
         found = campbell_of(model, speed, arguments.modes)
+    for at, omega in zip(speed.tolist(), found.untold.tolist(), strict=True):
+        if omega < math.inf:
+            print(f'{case.path}: at {rad_s_to_rpm(at):g} rpm a mode near {rad_s_to_hz(omega):.4g} '
+                  'Hz is missing: the support does not determine it', file=sys.stderr)
     # A speed may have fewer modes than wanted.
     rows = [(at, mode + 1, *numbers) for at, *of_speed in zip(
                 speed.tolist(), found.omega.tolist(), found.damping_ratio.tolist(),
@@ -34,6 +43,15 @@ def campbell(arguments: Namespace) -> int:
     _write(arguments.output, ['speed_rad_s', 'mode', 'omega_rad_s', 'damping_ratio', 'whirl'],
            rows)
     return 0
+
+
+@contextmanager
+def _naming(case: Case) -> Iterator[None]:
+    """Say which key of a case is to blame where modes cannot be found."""
+    try:
+        yield
+    except NotSolvedError as error:
+        raise InputError(f'{case.path}: {undecided(case, error)}') from error
 
 
 def _criticals(

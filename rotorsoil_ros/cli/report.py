@@ -2,14 +2,16 @@
 
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 import time
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.peaks import resonances
-from rotorsoil_ros.case.summary import derived_quantities, warnings
+from rotorsoil_ros.case.summary import derived_quantities, undecided, warnings
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.physics.errors import NotSolvedError
 from rotorsoil_ros.physics.infinite import InfiniteElementModel
 from rotorsoil_ros.physics.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.physics.response import ResponseTable
@@ -26,12 +28,17 @@ def check(arguments: Namespace) -> int:
     directory = cache.directory(arguments.cache)
     with progress('solving') as _:
         model = models.coupled_model(case, directory)
-        criticals = critical_speeds(model, case.speed_range)
         table = models.response_table(case, model, directory)
+        try:
+            criticals, doubts = _criticals(critical_speeds(model, case.speed_range)), []
+        except NotSolvedError as error:
+            # The machine can be answered for all the same: its response needs no modes.
+            criticals = [('critical speeds', 'not known, see the warning')]
+            doubts = [undecided(case, error)]
     _print_table(derived_quantities(case, model.soil_models))
-    _print_table(_criticals(criticals))
+    _print_table(criticals)
     _print_table(_peaks(case, table))
-    for warning in warnings(case):
+    for warning in chain(doubts, warnings(case)):
         print(f'warning: {warning}')
     return 0
 
@@ -84,14 +91,13 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
     yield f'{block}: file', str(cache.Cache(directory).path('compliance', models.key_of(soil)))
 
 
-def _criticals(criticals: Sequence[CriticalSpeed]) -> Iterable[tuple[str, str]]:
-    for critical in criticals:
-        yield (f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
-               f'{"forward" if critical.whirl > 0 else "backward"}, '
-               f'damping ratio {critical.damping_ratio:.2g}'
-               + ('' if critical.amplification_factor >= _FELT else ', hardly felt'))
-    if not criticals:
-        yield 'critical speeds', 'none in the speed range'
+def _criticals(criticals: Sequence[CriticalSpeed]) -> list[tuple[str, str]]:
+    lines = [(f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
+              f'{"forward" if critical.whirl > 0 else "backward"}, '
+              f'damping ratio {critical.damping_ratio:.2g}'
+              + ('' if critical.amplification_factor >= _FELT else ', hardly felt'))
+             for critical in criticals]
+    return lines or [('critical speeds', 'none in the speed range')]
 
 
 def _peaks(case: Case, table: ResponseTable) -> Iterable[tuple[str, str]]:

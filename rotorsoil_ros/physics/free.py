@@ -13,6 +13,9 @@ from rotorsoil_ros.physics.whirl import ORBITS
 # creep back, and a hysteretic soil alone gives such ones a little of it.
 _CREEPING = 0.2
 
+# A vibration with less damping than this is felt: its amplification factor is above 2.5.
+_LIGHT = 0.2
+
 # Newton's iteration stops at this relative step, whose square is the error left.
 _CONVERGED = 1e-6
 _ITERATIONS = 12
@@ -229,7 +232,7 @@ class FreeVibration:
         return (np.take_along_axis(np.where(keep, frequency, np.nan), order, axis=1),
                 full.transpose(0, 2, 1))
 
-    def solve(self, count: int) -> tuple[ComplexArray, ComplexArray, BoolArray]:
+    def solve(self, count: int) -> tuple[ComplexArray, ComplexArray, BoolArray, FloatArray]:
         """
         Solve for the lowest frequencies.
 
@@ -241,11 +244,17 @@ class FreeVibration:
             What `matrix` sends to zero.
         sound : (n,) bool array
             Whether every guess has led to a mode of its own.
+        untold : (n,) float array
+            Lowest frequency of a light vibration that is left out, as its compliance is not
+            determined [rad/s]; infinite where there is none.
 
         """
         guess, vector = self.guesses(count)
-        frequency = np.where(np.isfinite(guess), guess, self.highest)
-        wanted: BoolArray = np.isfinite(guess) & self.compliance.agrees(frequency)
+        exists = np.isfinite(guess)
+        frequency = np.where(exists, guess, self.highest)
+        wanted: BoolArray = exists & self.compliance.agrees(frequency)
+        light = exists & ~wanted & (np.abs(frequency.imag) < _LIGHT * np.abs(frequency))
+        untold = np.where(light, frequency.real, np.inf).min(axis=1, initial=np.inf)
         vector[~wanted] = 1.0
         active: BoolArray = wanted.copy()
         for _ in range(_ITERATIONS):
@@ -257,7 +266,12 @@ class FreeVibration:
         moved = wanted & (np.abs(frequency - guess) > _NEAR_GUESS * np.abs(frequency))
         frequency = np.where(wanted & ~active & vibrates(frequency), frequency, np.nan)
         unsound = active | moved | _repeats(frequency, vector)
-        return frequency, vector, np.asarray(~unsound.any(axis=1))
+        if self.compliance.known is not None:
+            # What a rough fit says far from the real axis may have no mode near its guess.
+            heavy = unsound & (guess.imag > _LIGHT * np.abs(guess))
+            frequency = np.where(heavy, np.nan, frequency)
+            unsound &= ~heavy
+        return frequency, vector, np.asarray(~unsound.any(axis=1)), untold
 
     def _newton(
         self, frequency: ComplexArray, vector: ComplexArray,

@@ -13,6 +13,7 @@ from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.physics.spectrum import Spectrum, SpectrumSolver
+from rotorsoil_ros.physics.units import rad_s_to_hz
 
 # Speeds at which the search for criticals begins, and up to how many it looks closer.
 _FIRST_SPEEDS = 41
@@ -49,6 +50,9 @@ class Campbell:
     branch : (n, m) int array
         Which curve a mode belongs to, followed across speed by its shape; -1 where there is no
         mode.
+    untold : (n,) float array
+        Lowest frequency of a light vibration that is missing, because what is known of the
+        support does not determine it [rad/s]; infinite where there is none.
 
     """
 
@@ -56,6 +60,7 @@ class Campbell:
     eigenvalue: ComplexArray
     whirl: IntArray
     branch: IntArray
+    untold: FloatArray
 
     @property
     def omega(self) -> FloatArray:
@@ -109,7 +114,7 @@ def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
     if not count >= 1:
         raise RotorSoilError(f'count must be at least 1 mode, got {count}')
     found = SpectrumSolver.lowest(model, speeds, count)
-    return Campbell(speeds, 1j * found.frequency, found.whirl, _follow(found))
+    return Campbell(speeds, 1j * found.frequency, found.whirl, _follow(found), found.untold)
 
 
 @dataclass(frozen=True)
@@ -184,6 +189,12 @@ def critical_speeds(
     tuple of CriticalSpeed
         Rising; roots of omega(Omega) - Omega on every followed mode, not points of a grid.
 
+    Raises
+    ------
+    NotSolvedError
+        If modes cannot be told apart, or a light one is not determined by what is known of the
+        support: a critical speed would be missing.
+
     """
     low, high = speed_range
     if not 0.0 <= low < high < math.inf:
@@ -199,6 +210,11 @@ def critical_speeds(
         if not len(closer) or len(speed) > _MOST_SPEEDS:
             break
         speed = np.union1d(speed, closer)
+    lost = float(found.untold.min())
+    if lost <= high:
+        raise NotSolvedError(
+            f'the compliance of the support changes too abruptly about {rad_s_to_hz(lost):.4g} '
+            'Hz to tell a lightly damped mode there')
     criticals = _close(solver, *_crossings(speed, found, branch))
     return tuple(sorted(criticals, key=lambda critical: critical.speed))
 

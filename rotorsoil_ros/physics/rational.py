@@ -25,11 +25,29 @@ _EXACT = 1e-9
 # Two fits that differ less, relative to the largest entry, say the same.
 _AGREED = 1e-2
 
+# What a fit misses may change by so much within the bandwidth of a vibration: a measured table
+# has a few percent of noise.
+_STEADY = 0.1
+
+# Two fits may differ by so many times what one of them misses.
+_SPREAD = 4.0
+
+# Where in the half bandwidth of a vibration a rough fit is corrected.
+_BANDWIDTH = (-1.0, -0.5, 0.0, 0.5, 1.0)
+
 # Entries that stay below this share of their diagonal are round-off.
 _UNCOUPLED = 1e-10
 
 # Stands for the distance to a node that is hit: small, yet its inverse is finite.
 _ON_NODE = 1e-150
+
+# A fit is continued unless it has poles below the real axis by this share of the highest sample,
+# or low ones of less damping than this, nearer to zero than so many times that sample; or unless
+# it grows beyond so many times its samples.
+_ON_AXIS = 1e-3
+_NARROW = 0.3
+_NEAR = 3.0
+_BOUND = 1e3
 
 # Poles this many times higher than all samples are constants.
 _FAR = 1e6
@@ -52,6 +70,8 @@ class Continuation:
         The function at real frequencies (n,), where the fit is too rough; else None.
     span : tuple of two floats
         Where it is known [rad/s].
+    missed : float
+        Most that the fit misses of a sample.
 
     """
 
@@ -60,6 +80,7 @@ class Continuation:
     size: FloatArray
     known: Callable[[FloatArray], ComplexArray] | None
     span: tuple[float, float]
+    missed: float
 
     @classmethod
     def of(
@@ -87,31 +108,51 @@ class Continuation:
             tuple((index, RationalMatrix.of(
                 omega[::step], values[::step, index[:, None], index])) for index in groups)
             for step in (1, 2))
-        fit = cls(parts, others, size, None, (float(omega[0]), float(omega[-1])))
-        rough = np.abs(fit(omega.astype(complex)) - values).max(initial=0.0) > _EXACT
-        return replace(fit, known=known) if rough else fit
+        fit = cls(parts, others, size, None, (float(omega[0]), float(omega[-1])), 0.0)
+        missed = float(np.abs(fit(omega.astype(complex)) - values).max(initial=0.0))
+        return replace(fit, known=known, missed=missed) if missed > _EXACT else fit
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:
         """Return the function over its size at complex frequencies, (..., d, d)."""
         values = self._fitted(self.parts, omega)
         if self.known is not None:
-            real = np.asarray(np.clip(omega.real, *self.span), dtype=float)
-            exact = self.known(real.ravel()) / (self.size[:, None] * self.size)
-            values += exact.reshape(values.shape)
-            values -= self._fitted(self.parts, real.astype(complex))
+            # Over the bandwidth of the vibration: a noisy table has no sharper meaning, and
+            # without decay it is met exactly.
+            for share in _BANDWIDTH:
+                real: FloatArray = omega.real + share * omega.imag
+                values += self._missed(real) / len(_BANDWIDTH)
         return values
+
+    def _missed(self, omega: FloatArray) -> ComplexArray:
+        """Return what the fit misses at real frequencies, those outside taken to the edge."""
+        assert self.known is not None
+        real: FloatArray = np.clip(omega, *self.span)
+        exact = self.known(real.ravel()) / (self.size[:, None] * self.size)
+        return exact.reshape(*real.shape, *exact.shape[1:]) - self._fitted(
+            self.parts, real.astype(complex))
 
     def agrees(self, omega: ComplexArray) -> BoolArray:
         """
         Return whether the samples determine the function at complex frequencies.
 
         Far from the real axis, and near the cut of a function that is not rational, fits to
-        different samples differ: what only one of them says is not known.
+        different samples differ: what only one of them says is not known. Where a fit has to
+        be corrected, what it misses must not change within the bandwidth of the vibration.
         """
         one, other = (self._fitted(parts, omega) for parts in (self.parts, self.others))
-        gap, size = (np.abs(values).max(axis=(-2, -1), initial=0.0)
-                     for values in (one - other, one))
-        return np.asarray(gap <= _AGREED * size)
+        gap = one - other
+        if self.known is None:
+            return np.asarray(_largest(gap) <= _AGREED * _largest(one))
+        real = omega.real.astype(complex)
+        gap -= self._fitted(self.parts, real) - self._fitted(self.others, real)
+        centre: FloatArray = omega.real
+        here = self._missed(centre)
+        size = _largest(one + here)
+        agreed = _largest(gap) <= min(max(_AGREED, _SPREAD * self.missed), _STEADY) * size
+        for side in (-1.0, 1.0):
+            edge: FloatArray = omega.real + side * omega.imag
+            agreed &= _largest(self._missed(edge) - here) <= _STEADY * size
+        return np.asarray(agreed)
 
     def _fitted(
         self, parts: tuple[tuple[IntArray, 'RationalMatrix'], ...], omega: ComplexArray,
@@ -184,26 +225,38 @@ class RationalMatrix:
     @classmethod
     def of(cls, omega: FloatArray, values: ComplexArray) -> 'RationalMatrix':
         """Fit samples (n, d, d) at ascending frequencies (n,)."""
-        entries = values.reshape(len(omega), -1)
-        error = np.abs(entries - entries.mean(axis=0)).max(axis=1)
-        chosen: list[int] = []
-        fits: list[tuple[float, ComplexArray]] = []
-        most = min(_MOST_NODES, len(omega) // 2)
-        while len(fits) < most and not _is_enough([worst for worst, _ in fits]):
-            chosen.append(int(error.argmax()))
-            rest = np.delete(np.arange(len(omega)), chosen)
-            cauchy = 1.0 / (omega[rest, None] - omega[chosen])
-            loewner = (entries[rest, None, :] - entries[chosen]) * cauchy[..., None]
-            weights = _smallest(loewner.transpose(0, 2, 1).reshape(-1, len(chosen)))
-            error = np.zeros(len(omega))
-            error[rest] = np.abs(
-                (cauchy * weights) @ entries[chosen] / (cauchy @ weights)[:, None]
-                - entries[rest]).max(axis=1)
-            fits.append((float(error.max()), weights))
-        least = min(worst for worst, _ in fits)
-        enough = _TOLERANCE if least <= _TOLERANCE else max(_ROUGH, 10.0 * least)
-        count = next(i for i, (worst, _) in enumerate(fits, 1) if worst <= enough)
-        return cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
+        chosen, fits = _greedy(omega, values.reshape(len(omega), -1))
+        errors = [worst for worst, _ in fits]
+        enough = _TOLERANCE if min(errors) <= _TOLERANCE else max(_ROUGH, 10.0 * min(errors))
+        most = next(count for count, worst in enumerate(errors, 1) if worst <= enough)
+        tried = [cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
+                 for count in range(1, most + 1)]
+        if tried[-1].continues(omega):
+            return tried[-1]
+        # The table follows no law that could be continued: noise, or too few points. The best
+        # one that may, if only a constant, leaves the rest to what is known at real frequencies.
+        sound = [(worst, fit) for worst, fit in zip(errors, tried, strict=False)
+                 if fit.continues(omega)]
+        return min(sound, key=lambda pair: pair[0])[1]
+
+    def continues(self, omega: FloatArray) -> bool:
+        """
+        Return whether the fit may stand for a passive support at complex frequencies.
+
+        Samples (n,) [rad/s] that are noisy put poles among growing vibrations, which no cause
+        has, or low and narrow peaks anywhere; those of a polynomial, as a spline through few
+        points is one, leave no bound at infinity. Each is a fit to the samples alone.
+        """
+        if not np.all(np.isfinite(self.weights)) or not self.weights.sum():
+            return False
+        found = self.states(_ROUGH)
+        decay = found.poles.imag / omega[-1]
+        narrow = np.abs(found.poles.imag) < _NARROW * np.abs(found.poles)
+        height = (np.abs(found.left).max(axis=0, initial=0.0)
+                  * np.abs(found.right).max(axis=1, initial=0.0))
+        noise = (decay < -_ON_AXIS) | (narrow & (height < _STEADY * np.abs(found.poles.imag)))
+        noise &= np.abs(found.poles) < _NEAR * omega[-1]
+        return not noise.any() and bool(np.abs(found.constant).max(initial=0.0) < _BOUND)
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:
         """Return the function at real or complex frequencies, (..., d, d)."""
@@ -230,6 +283,33 @@ class RationalMatrix:
         constant = (self.weights @ flat / self.weights.sum()).reshape(size, size)
         return States(constant, poles[pole], left[pole, :, term].T * terms[pole, term],
                       right[pole, term])
+
+
+def _largest(values: ComplexArray) -> FloatArray:
+    """Return the size of the largest entry of matrices (..., d, d)."""
+    return np.asarray(np.abs(values).max(axis=(-2, -1), initial=0.0))
+
+
+def _greedy(
+    omega: FloatArray, entries: ComplexArray,
+) -> tuple[list[int], list[tuple[float, ComplexArray]]]:
+    """Return nodes in the order of their choice, and error and weights of 1, 2, ... of them."""
+    error = np.abs(entries - entries.mean(axis=0)).max(axis=1)
+    chosen: list[int] = []
+    fits: list[tuple[float, ComplexArray]] = []
+    most = min(_MOST_NODES, len(omega) // 2)
+    while len(fits) < most and not _is_enough([worst for worst, _ in fits]):
+        chosen.append(int(error.argmax()))
+        rest = np.delete(np.arange(len(omega)), chosen)
+        cauchy = 1.0 / (omega[rest, None] - omega[chosen])
+        loewner = (entries[rest, None, :] - entries[chosen]) * cauchy[..., None]
+        weights = _smallest(loewner.transpose(0, 2, 1).reshape(-1, len(chosen)))
+        error = np.zeros(len(omega))
+        error[rest] = np.abs(
+            (cauchy * weights) @ entries[chosen] / (cauchy @ weights)[:, None]
+            - entries[rest]).max(axis=1)
+        fits.append((float(error.max()), weights))
+    return chosen, fits
 
 
 def _is_enough(errors: list[float]) -> bool:

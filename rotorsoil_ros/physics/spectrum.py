@@ -63,6 +63,9 @@ class Spectrum:
         Shape of the rotor, forward and backward, in its reduced coordinates.
     support : (n, p, s) complex array
         Motion of the support, over the columns of `Support.motion_rows`.
+    untold : (n,) float array
+        Lowest frequency of a light vibration that is left out because what is known of the
+        support does not determine it [rad/s]; infinite where there is none.
 
     """
 
@@ -71,6 +74,7 @@ class Spectrum:
     shape: ComplexArray
     rotor: ComplexArray
     support: ComplexArray
+    untold: FloatArray
 
 
 @dataclass(frozen=True)
@@ -219,7 +223,7 @@ class SpectrumSolver:
         inverse, amplitude = basis.spin(np.maximum(speed, _CREEP * basis.mass.max() ** -0.5))
         for reach in _REACHES:
             vibration = self._at(speed, inverse, amplitude, reach)
-            frequency, vector, sound = vibration.solve(count + spare)
+            frequency, vector, sound, untold = vibration.solve(count + spare)
             if sound.all():
                 break
         else:
@@ -230,12 +234,13 @@ class SpectrumSolver:
         frequency = np.where(known, frequency, np.nan)
         most = min(count, int(np.isfinite(frequency).sum(axis=1).max()))
         order = np.argsort(frequency.real, axis=1)[:, :most]
+        untold = np.where((untold >= low) & (untold <= high), untold, np.inf)
         return self._spectrum(vibration, amplitude, np.take_along_axis(frequency, order, axis=1),
-                              np.take_along_axis(vector, order[..., None], axis=1))
+                              np.take_along_axis(vector, order[..., None], axis=1), untold)
 
     def _spectrum(
         self, vibration: FreeVibration, amplitude: FloatArray, frequency: ComplexArray,
-        vector: ComplexArray,
+        vector: ComplexArray, untold: FloatArray,
     ) -> Spectrum:
         """Turn what the equations are solved for into shapes that all speeds share."""
         basis, exists = self.basis, np.isfinite(frequency)
@@ -252,7 +257,8 @@ class SpectrumSolver:
         shape = np.concatenate([moving, below], axis=-1)
         return Spectrum(
             frequency, np.where(exists, np.where(forward >= backward, 1, -1), 0),
-            np.where(exists[..., None], shape, np.nan), rotor, support * self.compliance.size)
+            np.where(exists[..., None], shape, np.nan), rotor, support * self.compliance.size,
+            untold)
 
     def _at(
         self, speed: FloatArray, inverse: FloatArray, amplitude: FloatArray, reach: float,
@@ -304,7 +310,9 @@ def _known(support: Support, highest: float) -> tuple[float, float]:
 
 
 def _widen(values: np.ndarray, width: int) -> np.ndarray:
-    """Fill up the second axis: with NaN, or with the 0 of no whirl."""
+    """Fill up the second axis, if there is one: with NaN, or with the 0 of no whirl."""
+    if values.ndim == 1:
+        return values
     missing = [(0, 0)] * values.ndim
     missing[1] = (0, width - values.shape[1])
     return np.pad(values, missing, constant_values=np.nan if values.dtype == complex else 0)

@@ -143,6 +143,38 @@ def test_fault_is_told_in_one_line_with_file_and_place(tmp_path, text, problem):
     assert '\n' not in said
 
 
+def test_jump_that_would_give_energy_between_rows_is_refused_with_its_place(tmp_path):
+    # Each row loses energy; the smooth curve through them does not.
+    rows = '\n'.join(f'{hz},2e8,{loss}' for hz, loss in ((0, 2e6), (75, 2e6), (150, 1e8)))
+    with pytest.raises(InputError) as caught:
+        read(written(tmp_path / 's.csv', f'hz,zz_re,zz_im\n{rows}\n'), ANY)
+    assert str(caught.value) == (
+        f'{tmp_path / "s.csv"}: changes too abruptly for a smooth curve through its 3 '
+        'frequencies: between 0 and 75 Hz the ground would give energy; add frequencies there, '
+        'or mend the jump')
+
+
+def test_modes_that_a_file_leaves_open_are_a_warning_and_name_the_key(tmp_path, capsys):
+    rows = '\n'.join(f'{hz},{k},{0.1 * k}' for hz, k in zip(
+        np.linspace(1.0, 150.0, 10), 6e7 * (1.0 + 0.5 * (-1.0) ** np.arange(10)), strict=True))
+    file = written(tmp_path / 's.csv', f'hz,xx_re,xx_im\n{rows}\n')
+    case = ['--set', f'support={{model: table, file: {file}}}', '--cache', str(tmp_path / 'c'),
+            '--set', 'foundations.0.mass=900']
+    reason = 'support.file: '
+    advice = 'give it at more frequencies, or without jumps (the response needs no modes)\n'
+    assert main(['check', str(PAPER), *case]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r'^critical speeds +not known, see the warning$', said, re.MULTILINE)
+    assert f'warning: {reason}' in said
+    assert advice in said
+    assert main(['campbell', str(PAPER), '--criticals', *case]) == 2
+    [line] = capsys.readouterr().err.splitlines(keepends=True)
+    assert line.startswith(f'{PAPER}: {reason}')
+    assert line.endswith(advice)
+    assert main(['response', str(PAPER), '--rpm', '60:9000:30', *case]) == 0
+    assert 'nan' not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize('setting, problem', [
     ('support={model: table}', 'support.file: is missing; the support model table needs it'),
     ('support={model: table, file: 3}', 'support.file: must be the path of a file, got 3'),

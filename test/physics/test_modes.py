@@ -148,7 +148,7 @@ def vibration_of(model, highest):
 def test_guesses_are_close_at_any_stiffness_of_the_bearings(stiffness):
     vibration = vibration_of(paper_machine(mass=20.0, stiffness=stiffness), 1500.0)
     guess, _ = vibration.guesses(8)
-    found, _, sound = vibration.solve(8)
+    found, _, sound, _ = vibration.solve(8)
     assert sound.all()
     np.testing.assert_allclose(guess, found, rtol=2e-3)  # at the upper end
 
@@ -163,7 +163,7 @@ def test_guesses_know_the_mass_of_rotor_modes_that_are_not_solved_for():
     vibration = vibration_of(CoupledModel(rotor, (block,), (CONE,)), 900.0)
     assert vibration.resonant.shape[1] == 0
     guess, _ = vibration.guesses(6)
-    found, _, _ = vibration.solve(6)
+    found, _, _, _ = vibration.solve(6)
     np.testing.assert_allclose(guess, found, rtol=1e-3)
 
 
@@ -406,6 +406,62 @@ def test_errors_of_interpolation_in_a_table_make_no_modes():
     found, expected = (campbell(paper_machine(soil, mass=4200.0), np.array([300.0]), 8)
                        .eigenvalue for soil in (table, CONE))
     np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+def scattered(count, noise, *, high):
+    """Return the cones as a table of so many rows with random errors of that size."""
+    omega = np.linspace(6.0, high, count)
+    scatter = 1.0 + noise * np.random.default_rng(7).standard_normal((2, count, 6))
+    values = CONE.compliance(omega)
+    diagonal = np.einsum('kii->ki', values)
+    np.einsum('kii->ki', values)[:] = scatter[0] * diagonal.real + 1j * scatter[1] * diagonal.imag
+    return ComplianceTable(omega, values)
+
+
+@pytest.mark.parametrize('noise', [0.0, 1e-3, 1e-2, 5e-2])
+@pytest.mark.parametrize('count', [4, 6, 10, 60])
+def test_coarse_and_noisy_tables_keep_the_light_criticals_of_the_cones(count, noise):
+    # Oracle: the cones themselves. The rotor has 1 % and less of its energy in the soil, which
+    # 5 % of noise and the splines through 4 points then move by less than this.
+    high = 300.0 * math.pi
+    found, expected = (
+        [one for one in critical_speeds(paper_machine(soil), (10.0, high))
+         if one.damping_ratio < 0.1]
+        for soil in (scattered(count, noise, high=1.2 * high), CONE))
+    assert [one.whirl for one in found] == [one.whirl for one in expected] == [-1, 1, -1, 1]
+    np.testing.assert_allclose([one.speed for one in found], [one.speed for one in expected],
+                               rtol=1e-3)
+    np.testing.assert_allclose([one.damping_ratio for one in found],
+                               [one.damping_ratio for one in expected], rtol=0.2)
+
+
+def test_mode_that_a_jumping_table_does_not_determine_is_an_error_and_not_left_out():
+    # 30 % up and down from row to row: the block's modes, with 8 % of damping, could be anything.
+    omega = np.linspace(6.0, 1000.0, 30)
+    jumps = 1.0 + 0.3 * (-1.0) ** np.arange(30)
+    stiffness = np.array([1.2e8, 1.2e8, 1.4e8, 3e7, 3e7, 5e7])
+    values = np.zeros((30, 6, 6), dtype=complex)
+    values[:, range(6), range(6)] = 1.0 / (jumps[:, None] * stiffness * (1.0 + 0.15j))
+    model = paper_machine(ComplianceTable(omega, values), mass=4200.0)
+    with pytest.raises(NotSolvedError, match=r'could not be told apart|changes too abruptly'):
+        critical_speeds(model, (10.0, 900.0))
+    # Its response needs no modes.
+    assert np.all(np.isfinite(model.unbalance_response(
+        np.linspace(10.0, 900.0, 50), np.array([1e-5, 0.0])).displacement))
+
+
+def test_diagram_tells_where_a_light_mode_is_missing(monkeypatch):
+    monkeypatch.setattr(rational, '_AGREED', -1.0)
+    model = paper_machine(mass=4200.0)
+    with pytest.raises(NotSolvedError, match='changes too abruptly about'):
+        critical_speeds(model, (10.0, 900.0))
+    # Guesses are within a few per mille of the modes that are there otherwise.
+    untold = campbell(model, np.array([300.0]), 10).untold
+    monkeypatch.undo()
+    whole = campbell(model, np.array([300.0]), 10)
+    light = whole.omega[0][whole.damping_ratio[0] < 0.2].min()
+    np.testing.assert_allclose(untold, light, rtol=0.02)
+    assert np.all(np.isinf(whole.untold))
 
 
 def rk4():

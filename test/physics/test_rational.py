@@ -108,3 +108,26 @@ def test_samples_do_not_tell_what_lies_on_a_cut():
     assert np.all(continuation.agrees(np.linspace(10.0, 2900.0, 50) * (1.0 + 0.3j)))
     on_cut = 1.0 + 1j * np.linspace(150.0, 3000.0, 200)
     assert not np.all(continuation.agrees(on_cut))
+
+
+@pytest.mark.parametrize('noise', [0.0, 1e-3, 1e-2])
+@pytest.mark.parametrize('count', [3, 6, 20, 60])
+def test_coarse_and_noisy_tables_are_met_and_have_no_poles_of_growth(count, noise):
+    omega = np.linspace(10.0, 3000.0, count)
+    scatter = 1.0 + noise * np.random.default_rng(count).standard_normal((2, count, 6))
+    values = CONE.compliance(omega)
+    diagonal = np.einsum('kii->ki', values)
+    np.einsum('kii->ki', values)[:] = scatter[0] * diagonal.real + 1j * scatter[1] * diagonal.imag
+    table = ComplianceTable(omega, values)
+    continuation = Continuation.of(np.linspace(10.0, 3000.0, 120), table.compliance)
+    at = np.linspace(20.0, 2900.0, 57)
+    np.testing.assert_allclose(continuation(at.astype(complex)),
+                               over_size(continuation, table.compliance(at)),
+                               rtol=0.0, atol=1e-9)  # where it need not be corrected
+    states = continuation.states(1e-4)
+    # Of a decaying ground, in w = lambda / i; the guesses of the modes start from these.
+    growing = (states.poles.imag < 0.0) & (np.abs(states.poles) < 3000.0)
+    assert not growing.any()
+    assert np.abs(states.constant).max() < 1e3
+    # Light vibration is as determined as the table; without decay, entirely.
+    assert np.all(continuation.agrees(at * (1.0 + 0.005j)))
