@@ -145,7 +145,7 @@ class Continuation:
             return np.asarray(_largest(gap) <= _AGREED * _largest(one))
         real = omega.real.astype(complex)
         gap -= self._fitted(self.parts, real) - self._fitted(self.others, real)
-        centre: FloatArray = omega.real
+        centre: FloatArray = np.asarray(omega.real, dtype=float)
         here = self._missed(centre)
         size = _largest(one + here)
         agreed = _largest(gap) <= min(max(_AGREED, _SPREAD * self.missed), _STEADY) * size
