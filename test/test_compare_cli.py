@@ -88,7 +88,7 @@ def summary(directory):
 def judged(log, case=FAN):
     """Return the comparison of a log with a case, without files and pictures."""
     rules = Rules()
-    expectation = Expectation.of(load(Path(case)), Path('no cache is needed for cones'))
+    expectation = Expectation.of(load(Path(case)), Path(log).parent / 'cache')
     return judge(read_run(Path(log), Reading()), expectation, rules)
 
 

@@ -10,7 +10,7 @@ from rotorsoil_ros.physics.units import rad_s_to_rpm
 GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unresolved')
 FAULTS = (*GAPS, 'malformed', 'velocity_missing')
 STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
-COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *STAMPS, 'measured')
+COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *STAMPS, 'measured', 'samples')
 
 
 class Health:

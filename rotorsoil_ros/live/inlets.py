@@ -3,13 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
+import re
 import struct
 from typing import TypeAlias
 
 import numpy as np
 
 from rotorsoil_ros.live.cdr import BODY, JointLayout, JointStateReader, LITTLE_ENDIAN
-from rotorsoil_ros.live.events import Measured
+from rotorsoil_ros.live.events import Measured, Samples
+from rotorsoil_ros.live.imu import AXES, IMU, ImuReader
 from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE, Records
 from rotorsoil_ros.live.monitor import Monitor
 from rotorsoil_ros.physics.arrays import FloatArray
@@ -20,17 +22,26 @@ TOPICS = SPEED_TOPICS | MEASURED_TOPICS
 ROTOR_JOINT = 'rotor'
 UNREAD = ('malformed', 'joint_missing')  # of no use, not even for the log
 
+# A sensor on a housing or a block has an axis; what turns cannot be measured so.
+RAW_NAME = re.compile(r'measured/(\w+_[xyz])/imu')
+
 Note: TypeAlias = Callable[[str, int], None]
 Outlet: TypeAlias = Callable[[Records], None]
+Inlet: TypeAlias = Callable[[Sequence[int], Sequence[bytes]], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Speeds:
-    """Messages that told a speed, with their n stamps [ns] and speeds (n,) [rad/s]."""
+    """
+    Messages that told a speed, with their n stamps [ns], speeds [rad/s] and angles [rad].
+
+    An angle that was not told is NaN.
+    """
 
     messages: Sequence[bytes]
     stamps: Sequence[int]
     speed: FloatArray
+    angle: FloatArray
 
 
 class SpeedReader:
@@ -42,16 +53,18 @@ class SpeedReader:
 
     def read(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> Speeds:
         """Read messages that were received at the given times [ns]."""
-        messages, stamps, speeds = [], [], []
+        messages, stamps, speeds, angles = [], [], [], []
         for received, cdr in zip(received_ns, cdrs, strict=True):
-            stamp, speed, fault = self._read(received, cdr)
+            stamp, speed, angle, fault = self._read(received, cdr)
             if fault:
                 self._note(fault, 1)
             if fault not in UNREAD:
                 messages.append(cdr)
                 stamps.append(stamp)
                 speeds.append(speed)
-        return Speeds(messages, stamps, np.array(speeds, dtype=float))
+                angles.append(angle)
+        return Speeds(messages, stamps, np.array(speeds, dtype=float),
+                      np.array(angles, dtype=float))
 
 
 class JointSpeed:
@@ -63,20 +76,22 @@ class JointSpeed:
         self._layout: JointLayout | None = None
         self._fault = ''
         self._unpack = struct.Struct('<d').unpack_from
-        self._at = 0
+        self._at = self._angle_at = 0
 
-    def read(self, received_ns: int, cdr: bytes) -> tuple[int, float, str]:
-        """Return stamp [ns], speed [rad/s] and fault; the stamp is the message's own."""
+    def read(self, received_ns: int, cdr: bytes) -> tuple[int, float, float, str]:
+        """Return stamp [ns], speed [rad/s], angle [rad] and fault; the stamp is its own."""
         del received_ns
         layout = self._reader.layout(cdr)
         if layout is not self._layout:
             self._learn(layout)
         if layout is None or self._fault == 'joint_missing':
-            return 0, math.nan, self._fault
+            return 0, math.nan, math.nan, self._fault
         stamp = layout.stamp_ns(cdr)
         if stamp < 0:
-            return 0, math.nan, 'malformed'
-        return stamp, math.nan if self._fault else self._unpack(cdr, self._at)[0], self._fault
+            return 0, math.nan, math.nan, 'malformed'
+        angle = self._unpack(cdr, self._angle_at)[0] if self._angle_at else math.nan
+        speed = math.nan if self._fault else self._unpack(cdr, self._at)[0]
+        return stamp, speed, angle, self._fault
 
     def _learn(self, layout: JointLayout | None) -> None:
         """Find out where in such messages the velocity is, or why it is not there."""
@@ -89,15 +104,18 @@ class JointSpeed:
             velocities, number = layout.span('velocity'), layout.names.index(self._joint)
             self._at = velocities.start + 8 * number
             self._fault = '' if self._at < velocities.stop else 'velocity_missing'
+            angles = layout.span('position')
+            at = angles.start + 8 * number
+            self._angle_at = at if at < angles.stop else 0
             self._unpack = struct.Struct(layout.order + 'd').unpack_from
 
 
-def _read_float(received_ns: int, cdr: bytes) -> tuple[int, float, str]:
-    """Return stamp [ns], speed [rad/s] and fault of a Float64, stamped when it was received."""
+def _read_float(received_ns: int, cdr: bytes) -> tuple[int, float, float, str]:
+    """Return stamp [ns], speed [rad/s], no angle and fault of a Float64, dated on receipt."""
     if len(cdr) < BODY + 8 or cdr[0] != 0 or cdr[1] > LITTLE_ENDIAN:
-        return 0, math.nan, 'malformed'
+        return 0, math.nan, math.nan, 'malformed'
     order = '<d' if cdr[1] == LITTLE_ENDIAN else '>d'
-    return received_ns, struct.unpack_from(order, cdr, BODY)[0], ''
+    return received_ns, struct.unpack_from(order, cdr, BODY)[0], math.nan, ''
 
 
 class SpeedInlet:
@@ -118,7 +136,8 @@ class SpeedInlet:
         speeds = self._reader.read(received_ns, cdrs)
         if speeds.messages:
             self._log(Records(self._topic, self._type, speeds.stamps, speeds.messages))
-            self._monitor.on_speed(np.array(speeds.stamps, dtype=np.int64), speeds.speed)
+            self._monitor.on_speed(
+                np.array(speeds.stamps, dtype=np.int64), speeds.speed, speeds.angle)
 
 
 class MeasuredInlet:
@@ -143,11 +162,37 @@ class MeasuredInlet:
                 states.position, states.velocity))
 
 
-def inlet(
-    name: str, topic: str, monitor: Monitor, *, rotor_joint: str, log: Outlet,
-) -> SpeedInlet | MeasuredInlet:
+class SampleInlet:
+    """Tells the monitor raw samples of one channel, and logs them as they came."""
+
+    def __init__(self, topic: str, channel: str, monitor: Monitor, *, log: Outlet) -> None:
+        self._topic, self._channel = topic, channel
+        self._monitor = monitor
+        self._log = log
+        self._reader = ImuReader()
+        self._axis = AXES.index(channel[-1])
+
+    def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
+        """Take in messages; their own stamps count, not when they were received."""
+        for messages, samples in self._reader.runs(cdrs):
+            if samples is None or samples.stamp_ns.min() < 0:
+                self._monitor.health.note('malformed', len(messages))
+                continue
+            self._log(Records(self._topic, IMU, samples.stamp_ns.tolist(), messages))
+            self._monitor.on_samples(Samples(
+                self._monitor.machine, self._channel, samples.stamp_ns,
+                samples.acceleration[:, self._axis]))
+
+
+def raw_channel(name: str) -> str:
+    """Return the channel of a name such as `measured/<channel>/imu`; empty of other names."""
+    found = RAW_NAME.fullmatch(name)
+    return found[1] if found else ''
+
+
+def inlet(name: str, topic: str, monitor: Monitor, *, rotor_joint: str, log: Outlet) -> Inlet:
     """
-    Return what takes in the messages of one of TOPICS.
+    Return what takes in the messages of one of TOPICS, or of raw samples.
 
     Parameters
     ----------
@@ -161,6 +206,8 @@ def inlet(
         Where accepted messages are written, byte for byte, at their own stamps.
 
     """
+    if channel := raw_channel(name):
+        return SampleInlet(topic, channel, monitor, log=log)
     if name in SPEED_TOPICS:
         return SpeedInlet(topic, SPEED_TOPICS[name], monitor, rotor_joint=rotor_joint, log=log)
     return MeasuredInlet(topic, name.removeprefix('measured/'), monitor, log=log)

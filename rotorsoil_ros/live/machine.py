@@ -24,11 +24,12 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A case with its models and its response table."""
+    """A case with its models, its response table, and the cache where more of it may lie."""
 
     case: config.Case
     model: CoupledModel
     table: ResponseTable
+    directory: Path
 
     @classmethod
     def load(
@@ -38,7 +39,7 @@ class Machine:
         case = config.load(case_file, overrides)
         directory = cache.directory(cache_directory)
         model = models.coupled_model(case, directory)
-        return cls(case, model, models.response_table(case, model, directory))
+        return cls(case, model, models.response_table(case, model, directory), directory)
 
     def _compliance_keys(self) -> dict[str, str]:
         return {f'compliance of {foundation.name}': models.key_of(soil)

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from rotorsoil_ros.case.comparison import Run
 from rotorsoil_ros.live import bag_reader
-from rotorsoil_ros.live.cdr import Cursor, JointStateReader, JointStates, STAMP
+from rotorsoil_ros.live.cdr import Cursor, JointStateReader, JointStates
 from rotorsoil_ros.live.events import NANOSECONDS
+from rotorsoil_ros.live.imu import AXES, IMU, ImuReader
 from rotorsoil_ros.live.inlets import ROTOR_JOINT, SPEED_TOPICS, SpeedReader
 from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE, Records, STRING
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
@@ -21,14 +22,7 @@ from rotorsoil_ros.physics.comparison import nearest, Signal
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
 from rotorsoil_ros.physics.orders import order_vectors, OrderVector, SpeedTrack, turns_with
 
-IMU = 'sensor_msgs/msg/Imu'
-SYNTHETIC = 'synthetic'  # begins the frame of every signal that no sensor measured
 AT_MOST = 4096
-AXES = ('x', 'y', 'z')
-
-# Doubles of an Imu before its linear acceleration: orientation and angular velocity, each with
-# the covariance.
-_BEFORE_ACCELERATION = 4 + 9 + 3 + 9
 
 # A velocity without a speed this near in time does not become a displacement [s].
 _TOLERANCE_S = 0.5
@@ -165,27 +159,13 @@ def _take(contents: _Contents, batch: Records, kind: str, reader: JointStateRead
 def _accelerations(
     contents: _Contents, cdrs: Sequence[bytes],
 ) -> Iterator[tuple[IntArray, FloatArray]]:
-    """Yield stamps [ns] and accelerations (n, 3) [m/s^2] of runs of equally long messages."""
-    by_size: dict[tuple[bytes, int], list[bytes]] = defaultdict(list)
-    for cdr in cdrs:
-        by_size[cdr[:2], len(cdr)].append(cdr)
-    for messages in by_size.values():
-        try:
-            cursor = Cursor(messages[0])
-            cursor.skip(STAMP.stop - STAMP.start)
-            contents.is_synthetic |= cursor.text().startswith(SYNTHETIC)
-            cursor.skip(8 * _BEFORE_ACCELERATION, align=8)
-            at = cursor.skip(8 * len(AXES), align=8)
-        except InputError:
+    """Yield stamps [ns] and accelerations (n, 3) [m/s^2]."""
+    for messages, samples in ImuReader().runs(cdrs):
+        if samples is None:
             contents.malformed += len(messages)
             continue
-        kind = np.dtype({
-            'names': ['sec', 'nanosec', 'acceleration'],
-            'formats': [f'{cursor.order}i4', f'{cursor.order}u4', f'(3,){cursor.order}f8'],
-            'offsets': [STAMP.start, STAMP.start + 4, at], 'itemsize': len(messages[0])})
-        rows = np.frombuffer(b''.join(messages), dtype=kind)
-        yield (rows['sec'].astype(np.int64) * NANOSECONDS + rows['nanosec'],
-               rows['acceleration'].astype(float))
+        contents.is_synthetic |= samples.is_synthetic
+        yield samples.stamp_ns, samples.acceleration
 
 
 def _speeds(contents: _Contents, joint: str) -> tuple[IntArray, FloatArray, FloatArray]:

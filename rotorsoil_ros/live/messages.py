@@ -8,13 +8,25 @@ from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
+from rcl_interfaces.msg import Log
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from rotorsoil_ros.live.cdr import ARRAYS, JointLayout, STAMP
-from rotorsoil_ros.live.events import Diagnostics, Event, Model, NANOSECONDS, Predicted
-from rotorsoil_ros.physics.arrays import FloatArray
+from rotorsoil_ros.live.events import (
+    Band,
+    Compared,
+    Demodulated,
+    Diagnostics,
+    Event,
+    Level,
+    Model,
+    NANOSECONDS,
+    Predicted,
+    Remark,
+)
+from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.prediction import Prediction
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -23,6 +35,18 @@ STRING = 'std_msgs/msg/String'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 DIAGNOSTICS_TOPIC = '/diagnostics'
 NODE_NAME = 'rotorsoil'
+LOG = 'rcl_interfaces/msg/Log'
+MOST_LAYOUTS = 64  # sets of channels that are measured together; more than that nobody means
+
+# Topics of a machine below the node's name, in the order of `Topics`, and their types.
+OWN_TOPICS = {
+    'amplitude': JOINT_STATE, 'phase': JOINT_STATE, 'amplitude_low': JOINT_STATE,
+    'amplitude_high': JOINT_STATE, 'residual': JOINT_STATE,
+    'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
+    'model': STRING}
+
+SEVERITY = {Level.OK: Log.INFO, Level.WARN: Log.WARN, Level.ERROR: Log.ERROR,
+            Level.STALE: Log.WARN}
 
 pack_stamp = struct.Struct('=iI').pack  # in the order of this machine, as rclpy does
 
@@ -43,6 +67,12 @@ class Topics:
 
     amplitude: str
     phase: str
+    amplitude_low: str
+    amplitude_high: str
+    residual: str
+    demodulated_amplitude: str
+    demodulated_phase: str
+    events: str
     model: str
     diagnostics: str = DIAGNOSTICS_TOPIC
 
@@ -50,7 +80,7 @@ class Topics:
     def of(cls, namespace: str, machine: str) -> 'Topics':
         """Name the topics as a node that nobody renamed does; namespace `` or `/plant`."""
         own = f'{namespace}/{NODE_NAME}/{machine}'
-        return cls(f'{own}/amplitude', f'{own}/phase', f'{own}/model')
+        return cls(*(f'{own}/{name}' for name in OWN_TOPICS))
 
 
 def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
@@ -118,12 +148,23 @@ class Encoder:
     def __init__(self, channels: Sequence[str], topics: Topics) -> None:
         self._topics = topics
         self._joint_states = JointStateWriter(channels)
+        self._writers: dict[tuple[str, ...], JointStateWriter] = {}
 
     def encode(self, event: Event) -> Iterator[Records]:
         """Yield the messages of an event; measurements came as messages already."""
         match event:
             case Predicted():
                 yield from self._predicted(event)
+            case Band():
+                yield from self._band(event)
+            case Compared(stamp_ns=stamps, speed=speed, channels=channels):
+                yield self._states(self._topics.residual, channels, stamps, event.residual,
+                                   speed[:, None] * event.residual)
+            case Demodulated():
+                yield from self._demodulated(event)
+            case Remark(stamp_ns=stamp_ns):
+                payload = serialize_message(log_message(event))
+                yield Records(self._topics.events, LOG, [stamp_ns], [payload])
             case Diagnostics(stamp_ns=stamp_ns):
                 payload = serialize_message(diagnostic_array(event))
                 yield Records(self._topics.diagnostics, DIAGNOSTICS, [stamp_ns], [payload])
@@ -140,21 +181,64 @@ class Encoder:
         yield Records(topics.phase, JOINT_STATE, stamps, write(stamps, *phases(event.prediction)))
 
 
+    def _band(self, event: Band) -> Iterator[Records]:
+        stamps, speed = event.stamp_ns.tolist(), event.speed[:, None]
+        for topic, values in ((self._topics.amplitude_low, event.low),
+                              (self._topics.amplitude_high, event.high)):
+            outer = np.stack([values, np.full(values.shape, np.nan)], axis=1)
+            yield Records(topic, JOINT_STATE, stamps,
+                          self._joint_states.write_parts(stamps, outer, speed * values))
+
+    def _demodulated(self, event: Demodulated) -> Iterator[Records]:
+        names = (event.channel, *(f'{event.channel}_{order}x' for order in event.orders[1:]))
+        turning = event.speed[:, None] * event.orders
+        yield self._states(self._topics.demodulated_amplitude, names, event.stamp_ns,
+                           event.amplitude, turning * event.amplitude)
+        ahead = np.arctan2(np.cos(event.phase), -np.sin(event.phase))  # of i X, in [-pi, pi]
+        yield self._states(self._topics.demodulated_phase, names, event.stamp_ns, event.phase,
+                           ahead)
+
+    def _states(
+        self, topic: str, names: tuple[str, ...], stamp_ns: IntArray, position: FloatArray,
+        velocity: FloatArray,
+    ) -> Records:
+        """Return JointStates of some channels, (n, names); no force is measured."""
+        writer = self._writers.get(names)
+        if writer is None:
+            if len(self._writers) >= MOST_LAYOUTS:
+                self._writers.clear()
+            writer = self._writers[names] = JointStateWriter(names)
+        stamps = stamp_ns.tolist()
+        outer = np.stack([position, np.full(position.shape, np.nan)], axis=1)
+        return Records(topic, JOINT_STATE, stamps, writer.write_parts(stamps, outer, velocity))
+
+
+def log_message(event: Remark) -> Log:
+    """Map a remark to the message of every ROS log."""
+    message = Log(level=SEVERITY[event.level], name=f'{NODE_NAME}.{event.machine}',
+                  msg=event.text)
+    message.stamp.sec, message.stamp.nanosec = divmod(event.stamp_ns, NANOSECONDS)
+    return message
+
+
 def diagnostic_array(event: Diagnostics) -> DiagnosticArray:
     """Map the health of a machine to the message that every ROS monitor reads."""
     message = DiagnosticArray()
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(event.stamp_ns, NANOSECONDS)
-    message.status = [DiagnosticStatus(
-        level=bytes([event.level]), name=f'{NODE_NAME}: {event.machine}',
-        hardware_id=event.machine, message=event.summary,
-        values=[KeyValue(key=key, value=decimal(value)) for key, value in event.values.items()],
-    )]
+    message.status = [_status(each) for each in (event, *event.parts)]
     return message
 
 
-def decimal(value: float) -> str:
+def _status(event: Diagnostics) -> DiagnosticStatus:
+    name = f'{NODE_NAME}: {event.machine} {event.name}'.rstrip()
+    return DiagnosticStatus(
+        level=bytes([event.level]), name=name, hardware_id=event.machine, message=event.summary,
+        values=[KeyValue(key=key, value=decimal(value)) for key, value in event.values.items()])
+
+
+def decimal(value: float | str) -> str:
     """Write a number without an exponent: counts as integers, quantities to the millionth."""
-    return str(value) if isinstance(value, int) else f'{value:.6f}'
+    return f'{value:.6f}' if isinstance(value, float) else str(value)
 
 
 class Messenger:

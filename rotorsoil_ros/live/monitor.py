@@ -1,11 +1,13 @@
 """What should the machine do at the speed it has just reported? Look it up, never invent it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from rotorsoil_ros.live.events import Event, Measured, Model, Predicted, Sink
+from rotorsoil_ros.live.events import Diagnostics, Event, Measured, Model, Predicted, Samples, Sink
 from rotorsoil_ros.live.health import Health
+from rotorsoil_ros.live.judge import Judge, Judging
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.errors import OutOfTableError
 from rotorsoil_ros.physics.prediction import Prediction
@@ -24,20 +26,24 @@ class Monitor:
 
     def __init__(
         self, machine: str, table: ResponseTable, unbalance: ComplexArray, *,
-        sinks: Sequence[Sink],
+        sinks: Sequence[Sink], judging: Judging | None = None,
     ) -> None:
         self.machine = machine
         self.table = table
         self.health = Health(machine, table.speed_range)
         self._sinks = tuple(sinks)
-        self.set_unbalance(unbalance)
+        self._predictor = table.predictor(unbalance)
+        self.judge = Judge(machine, self._predictor, judging or Judging())
 
     def set_unbalance(self, unbalance: ComplexArray) -> None:
         """Use another unbalance, (planes,) [kg m], from the next speed on."""
         self._predictor = self.table.predictor(unbalance)
+        self.judge.take_predictor(self._predictor, is_same_machine=True)
 
-    def on_speed(self, stamp_ns: IntArray, speed: FloatArray) -> None:
-        """Answer speeds [rad/s] and their stamps [ns], both of shape (n,)."""
+    def on_speed(
+        self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray | None = None,
+    ) -> None:
+        """Answer speeds [rad/s] at stamps [ns]; angles of the rotor [rad]; all (n,)."""
         if not len(speed):
             return
         self.health.receive(stamp_ns, speed)
@@ -47,6 +53,9 @@ class Monitor:
         except OutOfTableError:
             prediction = self._predict_with_gaps(speed)
         self._emit(Predicted(self.machine, stamp_ns, prediction))
+        if self.judge.on_speed(
+                stamp_ns, speed, np.full(len(speed), np.nan) if angle is None else angle):
+            self._emit_all(self.judge.follow(stamp_ns, speed))
         if self.health.has_news:
             self._emit(self.health.announce(int(stamp_ns[-1])))
 
@@ -55,6 +64,7 @@ class Monitor:
     ) -> None:
         """Answer from another table, from the next speed on."""
         self._predictor = table.predictor(unbalance)
+        self.judge.take_predictor(self._predictor, is_same_machine=False)
         self.table, self._sinks = table, tuple(sinks)
         self.health.speed_range = table.speed_range
 
@@ -62,6 +72,13 @@ class Monitor:
         """Hand on what a measuring system says about this machine."""
         self.health.note('measured', len(measured.stamp_ns))
         self._emit(measured)
+        self._emit_all(self.judge.on_measured(measured))
+
+    def on_samples(self, samples: Samples) -> None:
+        """Hand on raw samples; the vectors that are in them are found at the next tick."""
+        self.health.note('samples', len(samples.stamp_ns))
+        self._emit(samples)
+        self.judge.on_samples(samples)
 
     def begin(self, now_ns: int, description: Mapping[str, object]) -> None:
         """Begin to watch, and say what the predictions rest on."""
@@ -74,11 +91,19 @@ class Monitor:
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> None:
         """Report the health of the machine over the time since the last tick."""
-        self._emit(self.health.tick(now_ns, stale_after_s=stale_after_s))
+        found = list(self.judge.tick(now_ns, stale_after_s=stale_after_s))
+        parts = tuple(event for event in found if isinstance(event, Diagnostics))
+        self._emit_all(event for event in found if not isinstance(event, Diagnostics))
+        health = self.health.tick(now_ns, stale_after_s=stale_after_s)
+        self._emit(replace(health, parts=parts) if parts else health)
 
     def _emit(self, event: Event) -> None:
         for sink in self._sinks:
             sink(event)
+
+    def _emit_all(self, events: Iterable[Event]) -> None:
+        for event in events:
+            self._emit(event)
 
     def _predict_with_gaps(self, speed: FloatArray) -> Prediction:
         """Answer what is covered; count the reason and leave NaN where nothing is."""

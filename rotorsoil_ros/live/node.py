@@ -25,6 +25,8 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from rotorsoil_ros.case import cache
+from rotorsoil_ros.live.bench import Bench
 from rotorsoil_ros.live.loading import load_all
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import (
@@ -58,6 +60,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self._watches: list[Watch] = []
         self._log: RunLog | None = None
         self._diagnostics: LifecyclePublisher | None = None
+        self._bench: Bench | None = None
         self._held = ExitStack()
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -128,16 +131,19 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         log = RunLog(
             self._log_settings(), machines, tell=logger.info, complain=logger.error)
         held.callback(log.close)
+        bench = Bench(cache.directory(settings.cache), complain=logger.error)
+        held.callback(bench.close)
         diagnostics = self.create_lifecycle_publisher(DiagnosticArray, DIAGNOSTICS_TOPIC, OUTPUT)
         held.callback(self.destroy_lifecycle_publisher, diagnostics)
         for name, machine in machines.items():
-            watch = Watch(self, name, machine, settings=settings, log=log, diagnostics=diagnostics)
+            watch = Watch(self, name, machine, settings=settings, log=log,
+                          diagnostics=diagnostics, bench=bench)
             held.callback(watch.destroy)
             self._watches.append(watch)
         timer = self.create_timer(
             PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         held.callback(self.destroy_timer, timer)
-        self._log, self._diagnostics = log, diagnostics
+        self._log, self._diagnostics, self._bench = log, diagnostics, bench
         settings.is_locked = True
         where = f', log {log.path}' if log.path else ''
         self.get_logger().info(f'watching {", ".join(machines)}{where}')
@@ -151,7 +157,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
 
     def _forget(self) -> None:
         self.settings.is_locked = False
-        self._watches, self._log, self._diagnostics = [], None, None
+        self._watches, self._log, self._diagnostics, self._bench = [], None, None, None
 
     def _log_settings(self) -> LogSettings:
         value = self.settings.value
@@ -164,8 +170,11 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
     def _tick(self) -> None:
         """Once a second of wall time: health to the graph, logs to the disk."""
         stale_after_s = float(self.settings.value('stale_after_s'))
+        topics = {name for name, _ in self.get_topic_names_and_types()}
         for watch in self._watches:
-            watch.tick(self._now_ns(), stale_after_s=stale_after_s)
+            watch.tick(self._now_ns(), stale_after_s=stale_after_s, topics=topics)
+        if self._bench is not None:
+            self._bench.step()
         if self._log is not None:
             self._log.flush()
             self._report_log(self._log)

@@ -19,9 +19,13 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.live.inlets import ROTOR_JOINT
+from rotorsoil_ros.live.judge import Judging
 from rotorsoil_ros.physics.arrays import ComplexArray
+from rotorsoil_ros.physics.comparison import Matching
 from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.physics.units import rpm_to_rad_s
 
 Rule: TypeAlias = Callable[[Any], str]
 
@@ -123,6 +127,15 @@ OWN = {
         True, 'Whether to configure and activate without being asked. Read at the start only.'),
     'cache': Setting(
         '', 'Directory of computed tables; empty: $ROTORSOIL_CACHE or the cache of the user.'),
+    'match_tolerance_s': quantity(
+        Matching().tolerance, 'Largest distance between the stamps of a measurement and of the '
+        'speed that it belongs to', 's', span=(0.0, 60.0)),
+    'vector_turns': quantity(
+        Judging().turns, 'Turns of the rotor that make one vector of raw samples', 'turns',
+        span=(2.0, 1000.0)),
+    'band_period_s': quantity(
+        Judging().band_period_s, 'Message time between two bands, zero: one with every speed',
+        's', span=(0.0, 3600.0)),
     'log.directory': Setting('', 'Directory for logs; empty: no logs.'),
     'log.name': Setting(
         'run', 'Name of the log; where it is taken, name_2, name_3...',
@@ -147,6 +160,9 @@ OF_MACHINE = {
     'case': Setting('', 'Case file of the machine (YAML).'),
     'rotor_joint': Setting(
         ROTOR_JOINT, 'Joint of joint_states whose velocity is the rotor speed [rad/s].'),
+    'slow_roll_rpm': quantity(
+        0.0, 'Speed whose measured vector is runout and is subtracted, zero: none', 'rpm',
+        span=(0.0, 1e6)),
 }
 
 
@@ -214,6 +230,16 @@ class Settings:
     def cache(self) -> Path | None:
         """Directory of the cache, None for the usual one."""
         return Path(self.value('cache')).expanduser() if self.value('cache') else None
+
+    def judging(self, machine: str, case: Case) -> Judging:
+        """Return how measurements of a machine are held against its predictions."""
+        slow_roll = float(self.value(f'{machine}.slow_roll_rpm'))
+        return Judging.of(
+            case, turns=float(self.value('vector_turns')),
+            band_period_s=float(self.value('band_period_s')),
+            matching=Matching(
+                tolerance=float(self.value('match_tolerance_s')),
+                slow_roll_speed=rpm_to_rad_s(slow_roll) if slow_roll else math.nan))
 
     def declare_unbalance(
         self, machine: str, discs: Sequence[str], unbalance: ComplexArray,

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
+from rotorsoil_ros.case.criteria import criteria
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.bag_writer import LogFile
 from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.inlets import inlet, MeasuredInlet, ROTOR_JOINT, SPEED_TOPICS, SpeedInlet
+from rotorsoil_ros.live.inlets import Inlet, inlet, ROTOR_JOINT, SPEED_TOPICS
+from rotorsoil_ros.live.judge import Judging
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Encoder, Messenger, Records, Topics
 from rotorsoil_ros.live.monitor import Monitor
@@ -64,7 +66,10 @@ def predict(
         encoder = Encoder(machine.table.channels, Topics.of(first.namespace, name))
         viewer = [stack.enter_context(open_viewer(rrd, {name: machine}))] if rrd else []
         monitor = Monitor(name, machine.table, machine.case.unbalance,
-                          sinks=[Messenger(encoder, [log.write]), *viewer])
+                          sinks=[Messenger(encoder, [log.write]), *viewer],
+                          judging=Judging.of(machine.case))
+        monitor.judge.take_criteria(criteria(
+            machine.case, machine.model, machine.case.unbalance, machine.directory))
         inlets = {topic: inlet(found.name, topic, monitor, rotor_joint=rotor_joint, log=log.write)
                   for topic, (found, _) in inputs.items()}
         batches = bag_reader.batches(profile, lambda topic, _: topic in inputs, at_most=BATCH)
@@ -80,7 +85,7 @@ def predict(
 
 
 def _feed(
-    batches: Iterable[Records], inlets: Mapping[str, SpeedInlet | MeasuredInlet],
+    batches: Iterable[Records], inlets: Mapping[str, Inlet],
     monitor: Monitor, description: Mapping[str, object],
 ) -> Iterator[int]:
     """Hand batches to their inlets, ticking with the time of the messages; yield their sizes."""

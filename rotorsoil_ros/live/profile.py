@@ -11,7 +11,14 @@ from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.bag_writer import LogFile
 from rotorsoil_ros.live.cdr import ARRAYS
 from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.inlets import ROTOR_JOINT, SPEED_TOPICS, SpeedReader, TOPICS
+from rotorsoil_ros.live.imu import IMU
+from rotorsoil_ros.live.inlets import (
+    raw_channel,
+    ROTOR_JOINT,
+    SPEED_TOPICS,
+    SpeedReader,
+    TOPICS,
+)
 from rotorsoil_ros.live.messages import JOINT_STATE, JointStateWriter, Records
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.errors import InputError
@@ -41,8 +48,12 @@ class SpeedBatch:
 
 def place(topic: str, message_type: str) -> Place | None:
     """Return where an input of a machine stands; None for every other topic."""
-    for name, wanted in TOPICS.items():
-        if message_type == wanted and topic.endswith(f'/{name}'):
+    endings = [name for name, wanted in TOPICS.items() if message_type == wanted]
+    if message_type == IMU:
+        endings = ['/'.join(topic.split('/')[-3:])]
+        endings = endings if raw_channel(endings[0]) else []
+    for name in endings:
+        if topic.endswith(f'/{name}'):
             namespace, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
             return Place(namespace, machine, name)
     return None

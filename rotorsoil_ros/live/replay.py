@@ -12,16 +12,17 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.events import NANOSECONDS
+from rotorsoil_ros.live.imu import IMU
 from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE
 from rotorsoil_ros.live.profile import is_input, tells_speed
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
 
-TYPES = {JOINT_STATE: JointState, FLOAT64: Float64}
+TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
 DEPTH = 1000
 NAP_S = 0.05  # how soon an interrupt or a new subscriber is noticed
 DELIVERY_S = 5.0

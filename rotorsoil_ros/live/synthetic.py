@@ -11,8 +11,8 @@ from sensor_msgs.msg import Imu
 from rotorsoil_ros.live.bag_writer import LogFile
 from rotorsoil_ros.live.cdr import ARRAYS, STAMP
 from rotorsoil_ros.live.events import NANOSECONDS
+from rotorsoil_ros.live.imu import IMU, SYNTHETIC
 from rotorsoil_ros.live.inlets import ROTOR_JOINT
-from rotorsoil_ros.live.measured_log import IMU, SYNTHETIC
 from rotorsoil_ros.live.messages import JOINT_STATE, JointStateWriter, Records
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.coupled import CoupledModel

@@ -1,30 +1,31 @@
 """One machine on the graph: its subscriptions, its monitor and its publishers."""
 
+from collections.abc import Collection
 from functools import partial
 from typing import Any
 
+from rcl_interfaces.msg import Log
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.case import config
-from rotorsoil_ros.live.events import Sink
-from rotorsoil_ros.live.inlets import (
-    inlet,
-    MeasuredInlet,
-    SPEED_TOPICS,
-    SpeedInlet,
-    TOPICS,
-)
+from rotorsoil_ros.live.bench import Bench
+from rotorsoil_ros.live.events import Event, Level, Remark, Sink
+from rotorsoil_ros.live.imu import IMU
+from rotorsoil_ros.live.inlets import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
 from rotorsoil_ros.live.loading import reload
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import (
     Encoder,
     FLOAT64,
     JOINT_STATE,
+    LOG,
     Messenger,
+    OWN_TOPICS,
     Records,
+    STRING,
     Topics,
 )
 from rotorsoil_ros.live.monitor import Monitor
@@ -32,7 +33,8 @@ from rotorsoil_ros.live.parameters import Settings
 from rotorsoil_ros.live.reloading import Reloader
 from rotorsoil_ros.live.run_log import RunLog
 
-TYPES = {JOINT_STATE: JointState, FLOAT64: Float64}
+TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
+RAW_DEPTH = 1000  # samples kept while the node is busy
 STAMPED = (0,)  # reading the clock takes 3 us, and the message has its own stamp
 OUTPUT = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -48,7 +50,7 @@ class Watch:
 
     def __init__(
         self, node: LifecycleNode, name: str, machine: Machine, *, settings: Settings,
-        log: RunLog, diagnostics: LifecyclePublisher,
+        log: RunLog, diagnostics: LifecyclePublisher, bench: Bench,
     ) -> None:
         self.name = name
         self.is_active = False
@@ -56,13 +58,15 @@ class Watch:
         self._machine = machine
         self._settings = settings
         self._subscriptions: list[Any] = []
-        self._log = log
+        self._log, self._bench = log, bench
         self._topics = self._publish(diagnostics)
         self._shown_channels = machine.table.channels
         self._rivals: tuple[str, ...] = ()
-        self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks())
+        self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks(),
+                               judging=settings.judging(name, machine.case))
         self._speed_topics: list[str] = []
-        self._subscribe(log)
+        self._raw_topics: dict[str, str] = {}
+        self._subscribe()
         self._reloader = Reloader(
             node, name, check=self._check, load=self._load, take=self.take_machine)
 
@@ -70,10 +74,12 @@ class Watch:
         """Answer from now on."""
         self.is_active = True
         self.monitor.begin(now_ns, self._description())
+        self._ask()
 
-    def tick(self, now_ns: int, *, stale_after_s: float) -> None:
-        """Report the health of the machine."""
+    def tick(self, now_ns: int, *, stale_after_s: float, topics: Collection[str]) -> None:
+        """Report the health of the machine; hear sensors among the topics of the graph."""
         if self.is_active:
+            self._hear_sensors(topics)
             self._look_for_rivals()
             self.monitor.tick(now_ns, stale_after_s=stale_after_s)
 
@@ -82,6 +88,7 @@ class Watch:
         self.monitor.set_unbalance(self._unbalance())
         if self.is_active:
             self.monitor.describe(now_ns, self._description())
+            self._ask()
 
     def take_machine(self, machine: Machine) -> str:
         """Answer from another case, from the next speed on; return what to say of it."""
@@ -91,6 +98,7 @@ class Watch:
         if self.is_active:
             self.monitor.describe(
                 self._node.get_clock().now().nanoseconds, self._description())
+            self._ask()
         shown = '' if self._is_shown else '; its channels are others: no longer shown by rerun'
         return f'{self.name}: reloaded {machine.case.path}{shown}'
 
@@ -110,8 +118,18 @@ class Watch:
 
     def _sinks(self) -> list[Sink]:
         encoder = Encoder(self._machine.table.channels, self._topics)
-        messenger = Messenger(encoder, [self._send, self._log.write])
-        return [messenger, self._log.show] if self._is_shown else [messenger]
+        sinks: list[Sink] = [Messenger(encoder, [self._send, self._log.write]), self._tell]
+        return [*sinks, self._log.show] if self._is_shown else sinks
+
+    def _tell(self, event: Event) -> None:
+        """Say in the node's own log what somebody should act on."""
+        if isinstance(event, Remark) and event.level is not Level.OK:
+            self._node.get_logger().warning(f'{self.name}: {event.text}')
+
+    def _ask(self) -> None:
+        """Have the band of what is predicted computed, and what else it is judged by."""
+        self._bench.ask(self.name, self._machine, self._unbalance(),
+                        self.monitor.judge.take_criteria)
 
     def _check(self) -> None:
         config.load(self._settings.case_file(self.name))
@@ -136,35 +154,47 @@ class Watch:
 
     def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
         """Create the publishers; return the names that their topics have after remapping."""
-        create, own = self._node.create_lifecycle_publisher, f'~/{self.name}'
-        amplitude = create(JointState, f'{own}/amplitude', OUTPUT)
-        phase = create(JointState, f'{own}/phase', OUTPUT)
-        model = create(String, f'{own}/model', LATCHED)
-        self._own_publishers = [amplitude, phase, model]
+        self._own_publishers = [
+            self._node.create_lifecycle_publisher(
+                TYPES[kind], f'~/{self.name}/{name}', LATCHED if kind == STRING else OUTPUT)
+            for name, kind in OWN_TOPICS.items()]
         self._publishers = {publisher.topic_name: publisher
                             for publisher in (*self._own_publishers, diagnostics)}
-        return Topics(amplitude.topic_name, phase.topic_name, model.topic_name,
-                      diagnostics.topic_name)
+        return Topics(*self._publishers)
 
-    def _subscribe(self, log: RunLog) -> None:
-        profile = QoSProfile(
-            depth=self._settings.value('speed_depth'), reliability=ReliabilityPolicy[
-                self._settings.value('speed_reliability').upper()])
-        joint = self._settings.value(f'{self.name}.rotor_joint')
+    def _subscribe(self) -> None:
         for name, kind in TOPICS.items():
-            topic = self._node.resolve_topic_name(f'{self.name}/{name}')
-            taken_in = inlet(name, topic, self.monitor, rotor_joint=joint, log=log.write)
-            receive = self._receive_bare if kind == FLOAT64 else self._receive_stamped
+            topic = self._hear(name, kind, depth=self._settings.value('speed_depth'))
             if name in SPEED_TOPICS:
                 self._speed_topics.append(topic)
-            self._subscriptions.append(self._node.create_subscription(
-                TYPES[kind], topic, partial(receive, taken_in), profile, raw=True))
+        for channel in self._machine.table.channels:
+            name = f'measured/{channel}/imu'
+            if raw_channel(name):
+                self._raw_topics[self._node.resolve_topic_name(f'{self.name}/{name}')] = name
 
-    def _receive_stamped(self, taken_in: SpeedInlet | MeasuredInlet, cdr: bytes) -> None:
+    def _hear_sensors(self, topics: Collection[str]) -> None:
+        """Subscribe to raw samples that somebody publishes; of most channels nobody does."""
+        for topic in self._raw_topics.keys() & topics:
+            self._hear(self._raw_topics.pop(topic), IMU, depth=RAW_DEPTH)
+
+    def _hear(self, name: str, kind: str, *, depth: int) -> str:
+        """Subscribe to an input; return its topic."""
+        reliability = ReliabilityPolicy[self._settings.value('speed_reliability').upper()]
+        topic = str(self._node.resolve_topic_name(f'{self.name}/{name}'))
+        taken_in = inlet(
+            name, topic, self.monitor, log=self._log.write,
+            rotor_joint=self._settings.value(f'{self.name}.rotor_joint'))
+        receive = self._receive_bare if kind == FLOAT64 else self._receive_stamped
+        self._subscriptions.append(self._node.create_subscription(
+            TYPES[kind], topic, partial(receive, taken_in),
+            QoSProfile(depth=depth, reliability=reliability), raw=True))
+        return topic
+
+    def _receive_stamped(self, taken_in: Inlet, cdr: bytes) -> None:
         if self.is_active:
             taken_in(STAMPED, (cdr,))
 
-    def _receive_bare(self, taken_in: SpeedInlet | MeasuredInlet, cdr: bytes) -> None:
+    def _receive_bare(self, taken_in: Inlet, cdr: bytes) -> None:
         if self.is_active:
             taken_in((self._node.get_clock().now().nanoseconds,), (cdr,))
 

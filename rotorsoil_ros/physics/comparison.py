@@ -17,10 +17,10 @@ from rotorsoil_ros.physics.soil import require
 NANOSECOND = 1e-9
 
 # A slow-roll vector is the mean of what was measured within this share of its speed.
-_SLOW_ROLL_WINDOW = 0.05
+SLOW_ROLL_WINDOW = 0.05
 
 # Multiples of its standard error below which a vector is noise.
-_ABOVE_NOISE = 3.0
+ABOVE_NOISE = 3.0
 
 _Reasons: TypeAlias = npt.NDArray[Any]
 
@@ -236,13 +236,13 @@ def _channel(
     speed = matched(reference.speed)
     amplitude, phase = signal.amplitude, signal.phase
     rolling = (np.abs(speed - matching.slow_roll_speed)
-               <= _SLOW_ROLL_WINDOW * matching.slow_roll_speed)
+               <= SLOW_ROLL_WINDOW * matching.slow_roll_speed)
     rolling &= np.isfinite(amplitude * phase)
     runout, floor = complex(np.nan, np.nan), matching.noise
     if rolling.any():
         vectors = amplitude * np.exp(1j * phase)
         runout = complex(vectors[rolling].mean())
-        floor = max(floor, _ABOVE_NOISE * float(np.std(vectors[rolling])))
+        floor = max(floor, ABOVE_NOISE * float(np.std(vectors[rolling])))
         left = vectors - runout
         amplitude = np.where(np.isfinite(phase), np.abs(left), amplitude)
         phase = np.where(np.isfinite(phase), np.angle(left), phase)
@@ -250,7 +250,7 @@ def _channel(
     reason = np.full(len(index), Reason.USED, dtype=object)
     for why, holds in (  # the last that holds is told
             (Reason.NOT_QUASI_STATIC, (index >= 0) & ~slow[index]),
-            (Reason.BELOW_NOISE, amplitude < np.maximum(floor, _ABOVE_NOISE * signal.deviation)),
+            (Reason.BELOW_NOISE, amplitude < np.maximum(floor, ABOVE_NOISE * signal.deviation)),
             (Reason.SLOW_ROLL, rolling),
             (Reason.NO_PREDICTION, ~np.isfinite(predicted)),
             (Reason.OUT_OF_TABLE, (speed < lowest) | (speed > highest)),

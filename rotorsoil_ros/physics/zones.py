@@ -100,3 +100,13 @@ def support_class(lowest_natural_speed: float, speed: float) -> SupportClass:
 
     """
     return 'rigid' if lowest_natural_speed >= RIGID_MARGIN * speed else 'flexible'
+
+
+def held_support_class(
+    before: SupportClass | None, lowest_natural_speed: float, speed: float, *,
+    hysteresis: float,
+) -> SupportClass:
+    """Return the class of a support, unless the speed is within a share of where it changes."""
+    classes = {support_class(lowest_natural_speed, speed * (1.0 + turn * hysteresis))
+               for turn in (-1, 1)}
+    return before if before in classes else support_class(lowest_natural_speed, speed)

@@ -9,7 +9,8 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 
 from rotorsoil_ros.live.bag_writer import LogFile
-from rotorsoil_ros.live.measured_log import IMU, read_run, Reading
+from rotorsoil_ros.live.imu import IMU
+from rotorsoil_ros.live.measured_log import read_run, Reading
 from rotorsoil_ros.live.messages import JOINT_STATE, JointStateWriter, Records, STRING
 from rotorsoil_ros.physics.errors import InputError
 
