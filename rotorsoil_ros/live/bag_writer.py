@@ -99,7 +99,7 @@ class LogFile:
 
     @property
     def longest_ns(self) -> int:
-        """Time between the first and the last message of the topic that spans most [ns]."""
+        """Time from first to last message of the topic that spans most, latched ones aside [ns]."""
         return self._writer.longest_ns
 
     @property
@@ -113,7 +113,7 @@ class LogFile:
             self._schemas[kind] = self._writer.add_schema(kind, 'ros2msg', definition(kind))
         channel = self._writer.add_channel(records.topic, self._schemas[kind], {
             'offered_qos_profiles': offered_qos_text(latched=records.latched),
-            'topic_type_hash': type_hash(kind)})
+            'topic_type_hash': type_hash(kind)}, spans=not records.latched)
         self._channels[records.topic] = channel
         self.topics[records.topic] = Topic(records.topic, kind, records.latched)
         return channel
@@ -124,28 +124,37 @@ class BagWriter:
     A bag directory: `<name>/<name>_0.mcap` and `metadata.yaml`.
 
     A new file begins when one exceeds `split_mib` or spans `split_s` of message time; zero
-    splits only when the index of the file takes too much memory.
+    splits only when the index of the file takes too much memory. It opens with the last message
+    of every latched topic, at its own time: read alone, it says what it rests on.
     """
 
     def __init__(
         self, path: Path, *, split_mib: float = 0.0, split_s: float = 0.0,
-        gaps: dict[str, str] | None = None,
+        gaps: dict[str, str] | None = None, latched: dict[str, Records] | None = None,
     ) -> None:
         self.path = path
         self.gaps = gaps or {}
+        self.latched = latched or {}
         self.finished_size = 0
         self._split_size = split_mib * MEBIBYTE
         self._split_ns = split_s * NANOSECONDS
         self._done: list[FileEntry] = []
         self._topics: dict[str, Topic] = {}
         self._counts: Counter[str] = Counter()
-        self._number = 0
+        self._number = self._written = 0
         self._file = self._open()
         self._write_metadata()
 
     def write(self, records: Records) -> None:
         """Append messages of one topic."""
+        self.remember(records)
         self._file.write(records)
+
+    def remember(self, records: Records) -> None:
+        """Keep the last message of a latched topic for files to come."""
+        if records.latched:
+            self.latched[records.topic] = records._replace(
+                log_time_ns=records.log_time_ns[-1:], payloads=records.payloads[-1:])
 
     def flush(self) -> None:
         """Put everything onto the disk; call it every second, whatever the traffic."""
@@ -196,8 +205,13 @@ class BagWriter:
 
     @property
     def written(self) -> int:
-        """Messages that have reached the disk."""
-        return self._counts.total() + (0 if self._is_closed else self._file.counts.total())
+        """Messages that have reached the disk, repeated ones once."""
+        return self._written + (0 if self._is_closed else self._written_to_file)
+
+    @property
+    def _written_to_file(self) -> int:
+        # What is repeated stands in the first chunk, which is in the file as a whole or not.
+        return max(0, self._file.counts.total() - self._repeated)
 
     def _is_full(self) -> bool:
         file = self._file
@@ -206,6 +220,9 @@ class BagWriter:
 
     def _open(self) -> LogFile:
         file = LogFile(self.path / f'{self.path.name}_{self._number}.mcap')
+        for records in self.latched.values():
+            file.write(records)
+        self._repeated = len(self.latched)
         self._number += 1
         self._is_closed = False
         return file
@@ -218,6 +235,7 @@ class BagWriter:
             self._done.append(self._file.entry)
             self._topics |= self._file.topics
             self._counts += self._file.counts
+            self._written += self._written_to_file
             self.finished_size += self._file.size
 
     def _drop_deleted(self) -> None:

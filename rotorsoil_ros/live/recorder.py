@@ -51,10 +51,10 @@ class Recorder:
 
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
-        self._accepted += len(records.payloads)
         if self._failure:
-            self._lost_until_ns = records.log_time_ns[-1]
+            self._miss(records)
             return
+        self._accepted += len(records.payloads)
         try:
             self._bag.write(records)
         except OSError as error:
@@ -95,6 +95,14 @@ class Recorder:
             values['free_bytes'] = shutil.disk_usage(bag.path).free
         return Diagnostics('log', now_ns, level, summary, values)
 
+    def _miss(self, records: Records) -> None:
+        """Count what cannot be logged now; what is latched will be."""
+        if records.latched:
+            self._bag.remember(records)
+        else:
+            self._accepted += len(records.payloads)
+            self._lost_until_ns = records.log_time_ns[-1]
+
     @property
     def _written(self) -> int:
         return self._written_before + self._bag.written
@@ -124,14 +132,19 @@ class Recorder:
             else:
                 gaps = {**self._bag.gaps, f'gap_{len(self._bag.gaps) + 1}': gap}
                 written = self._written
-                self._bag = self._new_bag(new_directory(self._directory, self._name), gaps)
+                self._bag = self._new_bag(
+                    new_directory(self._directory, self._name), gaps, self._bag.latched)
                 self._written_before = written
             self._lost_before = self._lost
             self._failure, self._has_resumed = '', True
             self._tell(f'log goes on in {self._bag.file}, without {gap}')
 
-    def _new_bag(self, path: Path, gaps: dict[str, str] | None = None) -> BagWriter:
-        return BagWriter(path, split_mib=self._split_mib, split_s=self._split_s, gaps=gaps)
+    def _new_bag(
+        self, path: Path, gaps: dict[str, str] | None = None,
+        latched: dict[str, Records] | None = None,
+    ) -> BagWriter:
+        return BagWriter(path, split_mib=self._split_mib, split_s=self._split_s, gaps=gaps,
+                         latched=latched)
 
     def _make_room(self) -> None:
         if self._budget:

@@ -220,6 +220,28 @@ def test_a_log_is_split_by_size(tmp_path):
     assert len(bag_reader.files(bag.path)) == 4
 
 
+def test_every_file_of_a_split_log_says_what_it_rests_on(tmp_path):
+    bag = BagWriter(new_directory(tmp_path, 'run'), split_s=1.0)
+    bag.write(string_records())
+    bag.write(string_records(start=START + 7))  # the last one counts
+    for second in range(3):
+        bag.write(joint_records(1001, start=START + (100 + 2 * second) * 10**9))
+        bag.flush()
+    assert bag.written == 3005
+    bag.close()
+    assert bag.written == 3005
+    files = bag_reader.files(bag.path)
+    models = [[time for topic, time, _ in read_all(file) if topic == '/rotorsoil/fan/model']
+              for file in files]
+    # An old stamp does not make a file look as if it spanned more than a second.
+    assert models == [[START, START + 7], [START + 7], [START + 7], [START + 7]]
+    said = yaml.safe_load((bag.path / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert said['message_count'] == 3008 == len(read_all(bag.path))
+    assert [file['message_count'] for file in said['files']] == [1003, 1002, 1002, 1]
+    with AnyReader([bag.path]) as reader:
+        assert reader.message_count == 3008
+
+
 @pytest.mark.parametrize('compression', [None, CompressionMode.STORAGE])
 def test_bags_of_another_writer_are_read(tmp_path, compression):
     writer = ForeignWriter(tmp_path / 'foreign', version=9, storage_plugin=StoragePlugin.MCAP)

@@ -14,7 +14,7 @@ from rotorsoil_ros.live.bag_writer import new_directory
 from rotorsoil_ros.live.events import Level
 from rotorsoil_ros.live.recorder import Recorder
 
-from test_bag import joint_records, read_all, START
+from test_bag import joint_records, read_all, START, string_records
 
 SECOND = 10**9
 
@@ -125,6 +125,24 @@ def test_a_directory_that_became_a_file_is_waited_for(tmp_path):
     desk.recorder.close()
     assert len(read_all(tmp_path / 'logs' / 'run')) == 100
     assert len(desk.complaints) == 1
+
+
+def test_a_file_after_a_gap_opens_with_the_last_model_even_one_from_the_gap(
+        desk, tmp_path, full_disk):
+    desk.recorder.write(string_records())
+    desk.pass_second()
+    full_disk(1000)
+    desk.pass_second()
+    desk.recorder.write(string_records(start=START + 7))
+    assert desk.pass_second().values['lost'] == 200  # the model is not: it is still to come
+    full_disk(None)
+    desk.pass_second()
+    report = desk.pass_second()
+    assert (report.values['written'], report.values['lost']) == (201, 300)
+    desk.recorder.close()
+    told = [time for topic, time, _ in read_all(tmp_path / 'run' / 'run_1.mcap')
+            if topic == '/rotorsoil/fan/model']
+    assert told == [START + 7]
 
 
 def test_a_disk_that_stays_full_collects_no_litter(desk, tmp_path, full_disk):
