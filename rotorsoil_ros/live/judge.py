@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 import math
 
 import numpy as np
@@ -16,8 +17,10 @@ from rotorsoil_ros.live.events import (
     Band,
     Compared,
     Event,
+    Level,
     Measured,
     NANOSECONDS,
+    Remark,
     Samples,
 )
 from rotorsoil_ros.live.history import History
@@ -31,6 +34,7 @@ from rotorsoil_ros.physics.comparison import ABOVE_NOISE, Matching, nearest
 from rotorsoil_ros.physics.quasistatic import is_quasi_static
 from rotorsoil_ros.physics.response import Predictor
 
+MOST_NAMES = 16
 WINDOW_NS = 5 * NANOSECONDS  # of speeds from which their rate is told
 
 
@@ -82,6 +86,8 @@ class Judge:
         self._verdict = Verdict(machine, self._vibration, self._passing)
         self._demodulators: dict[str, Demodulator] = {}
         self._compared: list[Compared] = []
+        self._unknown: set[str] = set()
+        self._told: set[str] = set()
         self._band_ns = max(1, round(judging.band_period_s * NANOSECONDS))
         self._band_period = -1
 
@@ -139,6 +145,7 @@ class Judge:
         if criteria is not None:
             self._weigh(criteria, compared)
             yield from self._passing.finished(now_ns, criteria.resonances)
+        yield from self._strangers(now_ns)
         yield from self._verdict.tell(
             now_ns, stale_after_s=stale_after_s, has_data=bool(compared),
             has_phase=any(np.isfinite(each.phase).any() for each in compared),
@@ -159,6 +166,7 @@ class Judge:
         """Return vectors of the same channels beside their prediction, if there is any."""
         known = [column for column, name in enumerate(channels)
                  if name in self._predictor.channels]
+        self._unknown |= set(channels).difference(self._predictor.channels)
         if not known:
             return None
         columns = [self._predictor.channels.index(channels[column]) for column in known]
@@ -204,6 +212,17 @@ class Judge:
         floor = np.maximum(self._judging.rules.matching.noise, ABOVE_NOISE * compared.deviation)
         return np.asarray(counts[:, None] & np.isfinite(compared.predicted)
                           & (compared.amplitude >= floor))
+
+    def _strangers(self, now_ns: int) -> Iterator[Remark]:
+        """Tell once which measured channels no prediction has: a slip in a name, mostly."""
+        new = sorted(self._unknown - self._told)[:MOST_NAMES]
+        self._unknown = set()
+        if new and len(self._told) < MOST_NAMES:
+            self._told |= set(new)
+            near = [get_close_matches(name, self._predictor.channels, n=1) for name in new]
+            yield Remark(self.machine, now_ns, Level.WARN, 'measured but not predicted: '
+                         + ', '.join(name + (f' (did you mean {like[0]}?)' if like else '')
+                                     for name, like in zip(new, near, strict=True)))
 
     def _counts(self) -> dict[str, float]:
         return {'without_speed': self._pairing.given_up,
