@@ -8,8 +8,8 @@ from matplotlib.ticker import NullFormatter, StrMethodFormatter
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.plots import COLOURS, tidy
-from rotorsoil_ros.physics.arrays import IntArray
+from rotorsoil_ros.case.plots import COLOURS, draw_shape, FELT, tidy, title_of
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.modes import Campbell, campbell, critical_speeds, CriticalSpeed
 from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
@@ -18,9 +18,9 @@ _SPEEDS = 121
 _MODES = 16
 # The diagram ends at this many times the highest speed.
 _HIGHEST_ORDER = 2.0
-# An amplification factor below which a resonance is not felt (API 617).
-_FELT = 2.5
 _LARGEST_DRAWN_SHAPES = 6
+# Share of the range beyond which a label would leave the diagram.
+_NO_ROOM = 0.88
 _WHIRLS = {1: ('forward', COLOURS[0], '-'), -1: ('backward', COLOURS[1], '--')}
 
 
@@ -29,9 +29,9 @@ def modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, Figure
     criticals = critical_speeds(model, case.speed_range)
     found = campbell(model, np.linspace(*case.speed_range, _SPEEDS), _MODES)
     yield 'campbell', campbell_diagram(case, found, criticals)
-    felt = [critical for critical in criticals if critical.amplification_factor >= _FELT]
+    felt = [critical for critical in criticals if critical.amplification_factor >= FELT]
     if felt:
-        yield 'critical_shapes', critical_shapes(case, felt[:_LARGEST_DRAWN_SHAPES])
+        yield 'critical_shapes', critical_shapes(case, model, felt[:_LARGEST_DRAWN_SHAPES])
 
 
 def campbell_diagram(
@@ -48,7 +48,7 @@ def campbell_diagram(
         style = {'color': colour, 'linestyle': line, 'linewidth': 1.2}
         # What is hardly felt stays pale.
         damping = found.damping_ratio[row, mode]
-        pale = 1.0 if np.median(damping) < 0.5 / _FELT else 0.4
+        pale = 1.0 if np.median(damping) < 0.5 / FELT else 0.4
         top.plot(speed, rad_s_to_hz(found.omega[row, mode]), alpha=pale, **style)
         bottom.plot(speed, 100.0 * damping, alpha=pale, **style)
     _draw_criticals(top, criticals)
@@ -63,7 +63,7 @@ def campbell_diagram(
     top.legend(fontsize=7, loc='upper left')
     tidy(top)
     tidy(bottom)
-    figure.suptitle(f'{case.name}: Campbell diagram; pale: amplification factor below {_FELT:g}',
+    figure.suptitle(f'{case.name}: Campbell diagram; pale: amplification factor below {FELT:g}',
                     fontsize=10)
     return figure
 
@@ -94,51 +94,44 @@ def _branches(found: Campbell, highest: float) -> Iterator[tuple[IntArray, IntAr
 
 def _draw_criticals(axes: Axes, criticals: Sequence[CriticalSpeed]) -> None:
     for critical in criticals:
-        felt = critical.amplification_factor >= _FELT
+        felt = critical.amplification_factor >= FELT
         speed, colour = rad_s_to_rpm(critical.speed), _WHIRLS[critical.whirl][1]
         axes.plot(speed, rad_s_to_hz(critical.speed), 'o', color=colour, markersize=5, zorder=4,
                   fillstyle='full' if felt else 'none')
         if felt:
-            # A forward and a backward one often lie side by side.
+            # A forward and a backward one often lie side by side; near the end there is no room.
             place, edge = ((-5, 6), 'right') if critical.whirl > 0 else ((6, -9), 'left')
+            if critical.whirl < 0 and speed > _NO_ROOM * axes.get_xlim()[1]:
+                place, edge = (-5, 6), 'right'
             axes.annotate(f'{speed:.0f} rpm', (speed, rad_s_to_hz(critical.speed)), fontsize=7,
                           color=colour, textcoords='offset points', xytext=place, ha=edge)
 
 
-def critical_shapes(case: Case, criticals: Sequence[CriticalSpeed]) -> Figure:
-    """Draw the shaft in its modes at some critical speeds, when it is bent most."""
+def critical_shapes(
+    case: Case, model: CoupledModel, criticals: Sequence[CriticalSpeed],
+) -> Figure:
+    """Draw shaft and housings in the modes at some critical speeds, when they are bent most."""
     figure = Figure(figsize=(7.5, 1.6 * len(criticals) + 0.8), layout='constrained')
     rows = figure.subplots(len(criticals), 1, sharex=True, squeeze=False)[:, 0]
     for critical, axes in zip(criticals, rows, strict=True):
-        _draw_shape(axes, case, critical)
-        felt = f'amplification factor {critical.amplification_factor:.3g}'
-        axes.set_title(f'{rad_s_to_rpm(critical.speed):.0f} rpm, {_WHIRLS[critical.whirl][0]}, '
-                       f'{felt}', fontsize=8)
+        housings = (model.support.motion_rows @ critical.support).reshape(-1, 2)
+        draw_shape(axes, case, case.rotor.node_positions,
+                   *_at_their_most(critical.deflection, housings))
+        axes.set_ylim(-1.15, 1.15)
+        axes.set_title(title_of(critical), fontsize=8)
         axes.set_ylabel('shape [-]', fontsize=8)
-    rows[0].legend(fontsize=7, ncols=2)
+    rows[0].legend(fontsize=6, ncols=4)
     rows[-1].set_xlabel('y along the shaft [m]')
     figure.suptitle(f'{case.name}: modes at critical speeds; dotted: bearings, broad: discs',
                     fontsize=10)
     return figure
 
 
-def _draw_shape(axes: Axes, case: Case, critical: CriticalSpeed) -> None:
-    shape = critical.deflection
-    largest = shape.flat[np.abs(shape).argmax()]
-    # A whirling shaft shows x and z a quarter turn apart: each is drawn at its own largest.
-    for column, (axis, line) in enumerate((('x', '-'), ('z', '--'))):
-        own = shape[:, column]
-        angle = np.angle(own[np.abs(own).argmax()]) if np.any(own) else np.angle(largest)
-        axes.plot(case.rotor.node_positions, np.real(own * np.exp(-1j * angle)), linestyle=line,
-                  color=COLOURS[column], label=f'{axis} of the shaft')
-    _draw_stations(axes, case)
-
-
-def _draw_stations(axes: Axes, case: Case) -> None:
-    for bearing in case.rotor.bearings:
-        axes.axvline(bearing.position, color='grey', linestyle=':', linewidth=0.8)
-    for disc in case.rotor.discs:
-        axes.axvline(disc.position, color='#d9a441', linewidth=1.5, alpha=0.6)
-    axes.axhline(0.0, color='black', linewidth=0.5)
-    axes.set_ylim(-1.1, 1.1)
-    tidy(axes)
+def _at_their_most(
+    shaft: ComplexArray, housings: ComplexArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return x and z of a mode, (k, 2) and (b, 2), each axis at its own largest."""
+    # A whirling shaft shows x and z a quarter turn apart.
+    largest = np.take_along_axis(shaft, np.abs(shaft).argmax(axis=0)[None], axis=0)[0]
+    turn = np.exp(-1j * np.angle(largest))
+    return np.real(shaft * turn), np.real(housings * turn)

@@ -11,8 +11,10 @@ import numpy as np
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.drawing import machine_drawing
 from rotorsoil_ros.case.peaks import Peak, resolved_speeds, resonances
-from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.physics.arrays import FloatArray
 from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.errors import NotSolvedError
+from rotorsoil_ros.physics.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.physics.response import Predictor, ResponseTable
 from rotorsoil_ros.physics.rotor import Probe
 from rotorsoil_ros.physics.soil import DOFS
@@ -21,10 +23,13 @@ from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
 # Okabe and Ito: told apart by every eye, and in grey.
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#56b4e9', '#e69f00')
 
+# An amplification factor below which a resonance is not felt (API 617).
+FELT = 2.5
+
 _MICRO = 1e6
 _SMALLEST_DRAWN = 1e-15
 _LOWEST_TREND = 1e-4  # [um]; below it no instrument sees anything
-_LARGEST_DRAWN_PEAKS = 4
+_LARGEST_DRAWN = 4
 _LARGEST_DRAWN_NODES = 120
 # Not the whole turn: the gap before the dot shows the sense of an orbit.
 _TURN = np.linspace(0.0, 1.86 * np.pi, 181)
@@ -40,10 +45,13 @@ def all_figures(
         yield 'support', support(case, model)
     for kind, channels in channel_groups(case).items():
         yield f'bode_{kind}', bode(predictor, channels, f'{case.name}: {kind}')
-    peaks = main_peaks(case, predictor)
-    if peaks:
-        yield 'orbits', orbits(case, predictor, peaks)
-        yield 'shapes', shapes(case, model, peaks)
+    try:
+        criticals = drawn_criticals(critical_speeds(model, case.speed_range), predictor)
+    except NotSolvedError:
+        return  # the diagram of the modes is told to be missing
+    if criticals and np.any(case.unbalance):
+        yield 'orbits', orbits(case, predictor, criticals)
+        yield 'shapes', shapes(case, model, criticals)
 
 
 def main_peaks(case: Case, predictor: Predictor) -> list[Peak]:
@@ -51,7 +59,7 @@ def main_peaks(case: Case, predictor: Predictor) -> list[Peak]:
     moved = [name for kind, names in channel_groups(case).items() if kind != 'rocking'
              for name in names]
     peaks = sorted(resonances(predictor, tuple(moved)), key=lambda peak: -peak.amplitude)
-    return sorted(peaks[:_LARGEST_DRAWN_PEAKS], key=lambda peak: peak.speed)
+    return sorted(peaks[:_LARGEST_DRAWN], key=lambda peak: peak.speed)
 
 
 def channel_groups(case: Case) -> dict[str, list[str]]:
@@ -137,17 +145,36 @@ def _without_jumps(degrees: FloatArray) -> FloatArray:
     return np.where(jump, np.nan, degrees)
 
 
-def orbits(case: Case, predictor: Predictor, peaks: Sequence[Peak]) -> Figure:
-    """Draw the orbit of every station at some speeds, a row for each."""
+def title_of(critical: CriticalSpeed) -> str:
+    """Return which critical speed this is, where it whirls and how much it is damped."""
+    return (f'critical speed {rad_s_to_rpm(critical.speed):.0f} rpm, '
+            f'{"forward" if critical.whirl > 0 else "backward"}, damping ratio '
+            f'{critical.damping_ratio:.2g}, amplification factor '
+            f'{critical.amplification_factor:.4g}')
+
+
+def drawn_criticals(
+    criticals: Sequence[CriticalSpeed], predictor: Predictor,
+) -> list[CriticalSpeed]:
+    """Return the most amplified critical speeds at which a response is known, slowest first."""
+    felt = [one for one in criticals if one.amplification_factor >= FELT
+            and predictor.covers(np.array([one.speed]))[0]]
+    largest = sorted(felt, key=lambda one: -one.amplification_factor)[:_LARGEST_DRAWN]
+    return sorted(largest, key=lambda one: one.speed)
+
+
+def orbits(case: Case, predictor: Predictor, criticals: Sequence[CriticalSpeed]) -> Figure:
+    """Draw the orbit of every station at critical speeds, a row for each."""
     rotor = case.rotor
     stations = [*(f'{bearing.name}_journal' for bearing in rotor.bearings),
                 *(disc.name for disc in rotor.discs), *(probe.name for probe in rotor.probes)]
-    figure = Figure(figsize=(1.9 * len(stations) + 0.6, 2.1 * len(peaks) + 0.5),
+    figure = Figure(figsize=(max(1.9 * len(stations) + 0.6, 6.5), 2.4 * len(criticals) + 0.6),
                     layout='constrained')
-    grid = figure.subplots(len(peaks), len(stations), squeeze=False)
-    for peak, row in zip(peaks, grid, strict=True):
-        motion = predictor.predict(np.array([peak.speed])).displacement[0]
-        for name, axes in zip(stations, row, strict=True):
+    rows = figure.subfigures(len(criticals), 1, squeeze=False)[:, 0]
+    for critical, row in zip(criticals, rows, strict=True):
+        motion = predictor.predict(np.array([critical.speed])).displacement[0]
+        every = row.subplots(1, len(stations), squeeze=False)[0]
+        for name, axes in zip(stations, every, strict=True):
             x, z = (_over_a_turn(motion[predictor.channels.index(f'{name}_{axis}')])
                     for axis in 'xz')
             axes.plot(x, z, color=COLOURS[0])
@@ -156,11 +183,12 @@ def orbits(case: Case, predictor: Predictor, peaks: Sequence[Peak]) -> Figure:
             axes.tick_params(labelsize=6)
             axes.locator_params(nbins=4)
             axes.grid(alpha=0.3)
-        row[0].set_ylabel(f'{rad_s_to_rpm(peak.speed):.0f} rpm\nz [um]', fontsize=8)
-    for name, top, bottom in zip(stations, grid[0], grid[-1], strict=True):
-        top.set_title(name, fontsize=8)
-        bottom.set_xlabel('x [um]', fontsize=8)
-    figure.suptitle(f'{case.name}: orbits at the peaks, from the dot (t = 0) on', fontsize=10)
+            axes.set_title(name, fontsize=7)
+            axes.set_xlabel('x [um]', fontsize=7)
+        every[0].set_ylabel('z [um]', fontsize=7)
+        row.suptitle(title_of(critical), fontsize=8)
+    figure.suptitle(f'{case.name}: response to its unbalance, orbits from the dot (t = 0) on',
+                    fontsize=10)
     return figure
 
 
@@ -168,35 +196,46 @@ def _over_a_turn(amplitude: complex) -> FloatArray:
     return np.asarray(_MICRO * np.real(amplitude * np.exp(1j * _TURN)))
 
 
-def shapes(case: Case, model: CoupledModel, peaks: Sequence[Peak]) -> Figure:
-    """Draw the deflected shaft at some speeds, solved at the nodes of the mesh."""
+def shapes(case: Case, model: CoupledModel, criticals: Sequence[CriticalSpeed]) -> Figure:
+    """Draw the deflected shaft at critical speeds, solved at the nodes of the mesh."""
     nodes = case.rotor.node_positions
     nodes = nodes[::1 + len(nodes) // _LARGEST_DRAWN_NODES]
     probes = tuple(Probe(f'node_{number}', place) for number, place in enumerate(nodes))
     everywhere = replace(model, rotor=replace(case.rotor, probes=probes))
     first = everywhere.channels.index('node_0_x')
-    speed = np.array([peak.speed for peak in peaks])
-    motion = everywhere.unbalance_response(speed, case.unbalance).displacement
-    motion = motion[:, first:first + 2 * len(nodes)].reshape(len(peaks), -1, 2)
-    figure = Figure(figsize=(7.5, 1.7 * len(peaks) + 0.7), layout='constrained')
-    rows = figure.subplots(len(peaks), 1, sharex=True, squeeze=False)[:, 0]
-    for peak, shape, axes in zip(peaks, motion, rows, strict=True):
-        _draw_shape(axes, case, nodes, shape)
-        axes.set_ylabel(f'{rad_s_to_rpm(peak.speed):.0f} rpm\n[um]', fontsize=8)
-    rows[0].legend(fontsize=7, ncols=2)
+    speed = np.array([critical.speed for critical in criticals])
+    solved = everywhere.unbalance_response(speed, case.unbalance).displacement
+    motion = solved[:, first:first + 2 * len(nodes)].reshape(len(criticals), -1, 2)
+    figure = Figure(figsize=(7.5, 1.8 * len(criticals) + 0.7), layout='constrained')
+    rows = figure.subplots(len(criticals), 1, sharex=True, squeeze=False)[:, 0]
+    for critical, whole, shape, axes in zip(criticals, solved, motion, rows, strict=True):
+        angle = np.angle(shape.flat[np.abs(shape).argmax()])
+        housings = [[whole[everywhere.channels.index(f'{bearing.name}_housing_{axis}')]
+                     for axis in 'xz'] for bearing in case.rotor.bearings]
+        draw_shape(axes, case, nodes, _MICRO * np.real(shape * np.exp(-1j * angle)),
+                   _MICRO * np.real(np.array(housings) * np.exp(-1j * angle)))
+        axes.set_ylabel('deflection [um]', fontsize=8)
+        axes.set_title(title_of(critical), fontsize=8)
+    rows[0].legend(fontsize=6, ncols=3)
     rows[-1].set_xlabel('y along the shaft [m]')
-    figure.suptitle(f'{case.name}: shaft at the peaks, when it is bent most', fontsize=10)
+    figure.suptitle(f'{case.name}: response to its unbalance when the shaft is bent most; '
+                    'dotted: bearings, broad: discs', fontsize=9)
     return figure
 
 
-def _draw_shape(axes: Axes, case: Case, nodes: FloatArray, shape: ComplexArray) -> None:
-    largest = shape.flat[np.abs(shape).argmax()]
-    at_its_most = _MICRO * np.real(shape * np.exp(-1j * np.angle(largest)))
-    for column, axis in enumerate('xz'):
-        axes.plot(nodes, at_its_most[:, column], color=COLOURS[column],
+def draw_shape(
+    axes: Axes, case: Case, nodes: FloatArray, shaft: FloatArray, housings: FloatArray,
+) -> None:
+    """Draw x and z of the shaft (k, 2) and of the housings (b, 2), and where they stand."""
+    places = [bearing.position for bearing in case.rotor.bearings]
+    for column, (axis, line) in enumerate((('x', '-'), ('z', '--'))):
+        axes.plot(nodes, shaft[:, column], linestyle=line, color=COLOURS[column],
                   label=f'{axis} of the shaft')
-    for bearing in case.rotor.bearings:
-        axes.axvline(bearing.position, color='grey', linestyle=':', linewidth=0.8)
+    for column, (axis, mark) in enumerate((('x', 's'), ('z', 'D'))):
+        axes.plot(places, housings[:, column], mark, color=COLOURS[column], markersize=5,
+                  fillstyle='none', label=f'{axis} of the housings')
+    for place in places:
+        axes.axvline(place, color='grey', linestyle=':', linewidth=0.8)
     for disc in case.rotor.discs:
         axes.axvline(disc.position, color='#d9a441', linewidth=1.5, alpha=0.6)
     axes.axhline(0.0, color='black', linewidth=0.5)

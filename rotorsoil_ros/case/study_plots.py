@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -17,8 +18,9 @@ from rotorsoil_ros.physics.units import rad_s_to_rpm
 _MICRO = 1e6
 # Block masses of the study, times that of the case.
 _MASS_RATIOS = (0.25, 1.0, 4.0, 16.0)
-# Dots closer to the centre, as a share of the largest amplitude, would lie on one another.
-_LEAST_LABELLED = 0.1
+# Labels closer to one another or to the centre, as a share of the largest amplitude at a peak,
+# would lie on one another.
+_LEAST_LABELLED = 0.12
 _LINES = (':', '-', '--', '-.')
 
 
@@ -38,16 +40,7 @@ def polar(case: Case, predictor: Predictor, peaks: Sequence[Peak]) -> Figure:
             values = response[:, predictor.channels.index(f'{name}_{axis}')]
             axes.plot(np.angle(values), _MICRO * np.abs(values), color=colour, linestyle=line,
                       linewidth=1.0, label=f'{name}_{axis}')
-        column = predictor.channels.index(f'{name}_x')
-        least = _LEAST_LABELLED * np.abs(response[:, column]).max()
-        for peak in peaks:
-            at = predictor.predict(np.array([peak.speed])).displacement[0, column]
-            if np.abs(at) < least:
-                continue
-            axes.plot(np.angle(at), _MICRO * np.abs(at), 'o', color=COLOURS[0], markersize=3)
-            axes.annotate(f'{rad_s_to_rpm(peak.speed):.0f} rpm',
-                          (np.angle(at), _MICRO * np.abs(at)), fontsize=6, xytext=(0, 4),
-                          textcoords='offset points', ha='right' if at.real > 0.0 else 'left')
+        _mark_peaks(axes, predictor, name, peaks)
         axes.tick_params(labelsize=7)
         axes.set_rlabel_position(67.5)
         axes.set_xlabel('angle: phase [deg]; radius: amplitude [um]', fontsize=7)
@@ -55,6 +48,30 @@ def polar(case: Case, predictor: Predictor, peaks: Sequence[Peak]) -> Figure:
     figure.suptitle(f'{case.name}: response of the discs, zero-to-peak, dots at the peaks',
                     fontsize=10)
     return figure
+
+
+def _mark_peaks(
+    axes: Axes, predictor: Predictor, disc: str, peaks: Sequence[Peak],
+) -> None:
+    """Put a dot at every peak on the larger of both curves, and its speed where there is room."""
+    columns = [predictor.channels.index(f'{disc}_{axis}') for axis in 'xz']
+    speeds = np.array([peak.speed for peak in peaks])
+    answers = predictor.predict(speeds).displacement[:, columns]
+    near = _LEAST_LABELLED * np.abs(answers).max(initial=0.0)
+    taken = [0j]
+    # The largest first: it is sure to get its label.
+    for index in np.argsort(-np.abs(answers).max(axis=1)):
+        axis = int(np.abs(answers[index]).argmax())
+        at = complex(answers[index, axis])
+        place = (float(np.angle(at)), _MICRO * abs(at))
+        if abs(at) < near:
+            continue
+        axes.plot(*place, 'o', color=COLOURS[axis], markersize=3)
+        if all(abs(at - other) >= near for other in taken):
+            axes.annotate(f'{rad_s_to_rpm(float(speeds[index])):.0f} rpm', place, fontsize=6,
+                          xytext=(0, 4), textcoords='offset points',
+                          ha='right' if at.real > 0.0 else 'left')
+            taken.append(at)
 
 
 def mass_ratios(case: Case, model: CoupledModel) -> Figure:

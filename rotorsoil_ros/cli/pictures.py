@@ -17,9 +17,10 @@ from rotorsoil_ros.case.paper import claim_numbers, paper_figures, PaperFigure, 
 from rotorsoil_ros.case.plots import all_figures, main_peaks
 from rotorsoil_ros.case.soil_plots import compliance_figure
 from rotorsoil_ros.case.study_plots import mass_ratios, polar
+from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import RotorSoilError
+from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.physics.response import ResponseTable
 
 
@@ -32,12 +33,21 @@ def plot(arguments: Namespace) -> int:
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
         for name, figure in chain(
-                all_figures(case, model, table), modal_figures(case, model),
+                all_figures(case, model, table), _modal_figures(case, model),
                 _studies(case, model, table), _soil_figures(case, model, directory)):
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)
             print(path)
     return 0
+
+
+def _modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, Figure]]:
+    """Yield the pictures of the modes, or say why there are none."""
+    try:
+        yield from modal_figures(case, model)
+    except NotSolvedError as error:
+        print(f'no pictures campbell, critical_shapes, orbits, shapes: {case.path}: '
+              f'{undecided(case, error)}', file=sys.stderr)
 
 
 def _studies(

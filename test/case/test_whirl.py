@@ -1,4 +1,4 @@
-"""Whirl directions that the commands print, against orbits and gyroscopics of the full matrices."""
+"""Whirl directions that the verbs print, against orbits and gyroscopics of full matrices."""
 
 import csv
 import io
