@@ -64,7 +64,9 @@ class Plant:
         settings = LogSettings(
             directory=str(directory / 'logs') if logs else '', name='soak', mcap=True,
             rerun=False, rerun_url='', split_mib=16.0, split_s=0.0, budget_mib=256.0)
-        self.log = RunLog(settings, {}, tell=lambda text: None, complain=sys.exit)
+        self._complaints: list[str] = []
+        self.log = RunLog(
+            settings, {}, tell=lambda text: None, complain=self._complaints.append)
         stack.callback(self.log.close)
         self.monitors, self.inlets = [], list[SpeedInlet | MeasuredInlet]()
         for name in names:
@@ -80,7 +82,9 @@ class Plant:
         """Do what the node does once a second."""
         for monitor in self.monitors:
             monitor.tick(now_ns, stale_after_s=3.0)
-        self.log.flush()
+        self.log.flush(wait_s=10.0)  # a day passes faster than the log is written
+        if self._complaints:
+            sys.exit(self._complaints[0])
 
 
 def run(plant: Plant, messages: int) -> tuple[list[float], float]:

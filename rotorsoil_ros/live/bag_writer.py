@@ -99,7 +99,7 @@ class LogFile:
 
     @property
     def longest_ns(self) -> int:
-        """Time from first to last message of the topic that spans most, latched ones aside [ns]."""
+        """Time from first to last message of what spans most, latched topics aside [ns]."""
         return self._writer.longest_ns
 
     @property

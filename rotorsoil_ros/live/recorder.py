@@ -49,6 +49,11 @@ class Recorder:
         """Directory of the bag."""
         return self._bag.path
 
+    @property
+    def file(self) -> Path:
+        """The file that is being written."""
+        return self._bag.file
+
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
         if self._failure:
@@ -71,6 +76,15 @@ class Recorder:
                     self._make_room()
         except OSError as error:
             self._fail(error)
+
+    def interrupt(self, count: int, until_ns: int, reason: str) -> None:
+        """Write down a gap: messages that never came here, until a time [ns], and why."""
+        self._accepted += count
+        if not self._failure:
+            self._failure = reason
+            self._bag.abandon()
+        self._lost_until_ns = until_ns
+        self.flush()
 
     def close(self) -> None:
         """Finish the bag."""
@@ -150,7 +164,7 @@ class Recorder:
         if self._budget:
             self._looked_at = self._bag.size
             for gone in make_room(self._directory, self._name, budget=self._budget,
-                                  current=self._bag.path, keep=[self._bag.file]):
+                                  current=self._bag.path, keep=[self.file]):
                 self._bag.forget(gone.name)
 
 

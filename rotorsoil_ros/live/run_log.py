@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 import os
 from pathlib import Path
@@ -15,6 +16,7 @@ from rotorsoil_ros.live.events import Diagnostics, Event
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Records
 from rotorsoil_ros.live.recorder import Recorder
+from rotorsoil_ros.live.recording import Recording
 from rotorsoil_ros.live.shelf import Recovery
 from rotorsoil_ros.physics.errors import InputError
 
@@ -56,59 +58,69 @@ class RunLog:
     ) -> None:
         self.path: Path | None = None
         self._complain = complain
-        self._recorder: Recorder | None = None
+        self._recording: Recording | None = None
         self._recovery: Recovery | None = None
-        self._viewer: Aside | None = None
+        self._viewer: Aside[Event | Path] | None = None
+        self._shown_file: Path | None = None
         if settings.directory and (settings.mcap or settings.rerun):
             directory = Path(settings.directory).expanduser()
             self.path = new_directory(directory, settings.name)
             self._recovery = Recovery(directory, tell=tell, complain=complain)
         if self.path and settings.mcap:
-            self._recorder = Recorder(
+            self._recording = Recording(Recorder(
                 self.path, split_mib=settings.split_mib, split_s=settings.split_s,
-                budget_mib=settings.budget_mib, tell=tell,
-                complain=complain)
+                budget_mib=settings.budget_mib, tell=tell, complain=complain), complain=complain)
+            self._shown_file = self._recording.file if settings.rerun else None
         if (self.path and settings.rerun) or settings.rerun_url:
             self._viewer = self._open_viewer(settings, machines)
 
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
-        if self._recorder is not None:
-            self._recorder.write(records)
+        if self._recording is not None:
+            self._recording.write(records)
 
     def show(self, event: Event) -> None:
         """Show an event in the viewer."""
         if self._viewer is not None:
             self._viewer(event)
 
-    def flush(self) -> None:
-        """Put everything onto the disk; called once a second."""
+    def flush(self, *, wait_s: float = 0.0) -> None:
+        """Put everything onto the disk, waiting for room if asked to; called once a second."""
+        if self._recording is not None:
+            self._recording.flush(wait_s=wait_s)
+            self._follow(self._recording.file)
         if self._viewer is not None:
             self._viewer.flush()
-        if self._recorder is not None:
-            self._recorder.flush()
         if self._recovery is not None:
             self._recovery.step()
 
     def report(self, now_ns: int) -> Diagnostics | None:
         """Tell how logging goes, if anything is logged."""
-        return self._recorder.report(now_ns) if self._recorder is not None else None
+        return self._recording.report(now_ns) if self._recording is not None else None
 
     def close(self) -> None:
         """Finish bag and recording."""
         viewer, self._viewer = self._viewer, None
-        recorder, self._recorder = self._recorder, None
+        recording, self._recording = self._recording, None
         recovery, self._recovery = self._recovery, None
-        if recorder is not None:
-            recorder.close()
+        if recording is not None:
+            recording.close()
         if recovery is not None:
             recovery.close()
         if viewer is not None:
             viewer.close()
 
+    def _follow(self, file: Path) -> None:
+        """Begin a recording of the viewer beside each new file of the bag."""
+        if self._viewer is None or self._shown_file in (None, file):
+            return
+        # Before what was collected: the file began when the second before was put onto the disk.
+        if self._viewer.put([file.with_suffix('.rrd')]):
+            self._shown_file = file
+
     def _open_viewer(
         self, settings: LogSettings, machines: Mapping[str, Machine],
-    ) -> Aside | None:
+    ) -> Aside[Event | Path] | None:
         recording = self.path / f'{self.path.name}.rrd' if self.path and settings.rerun else None
         url = settings.rerun_url
         if url and not listens(url):
@@ -117,11 +129,33 @@ class RunLog:
         if recording is None and not url:
             return None
         try:
-            viewer = open_viewer(recording, machines, url=url)
+            show = Show(partial(open_viewer, machines=machines, url=url), recording)
         except InputError as error:
             self._complain(str(error))
             return None
-        return Aside(viewer.show, viewer.close, complain=self._complain)
+        return Aside(show.take, show.close, complain=self._complain)
+
+
+class Show:
+    """What the viewer shows, in one recording after the other: each is bounded as its bag is."""
+
+    def __init__(self, begin: 'Callable[[Path | None], RerunSink]', first: Path | None) -> None:
+        self._begin = begin
+        self._sink = begin(first)
+
+    def take(self, batch: list[Event | Path]) -> None:
+        """Show events; at a path go on in a new recording."""
+        for item in batch:
+            if isinstance(item, Path):
+                self._sink.close()
+                self._sink = self._begin(item)
+            else:
+                self._sink(item)
+        self._sink.flush()
+
+    def close(self) -> None:
+        """Finish the last recording."""
+        self._sink.close()
 
 
 def listens(url: str) -> bool:

@@ -147,9 +147,9 @@ def make_room(
     """
     Remove the oldest logs until what is left fits into a budget; return what was removed.
 
-    Whole bags go first, then files of the current one. A directory counts as a log if it is
-    named like one and holds an MCAP file that this package wrote; whatever else lies in it
-    stays.
+    Whole bags go first, then files and recordings of the current one. A directory counts as a
+    log if it is named like one and holds an MCAP file that this package wrote; whatever else
+    lies in it stays.
 
     Parameters
     ----------
@@ -174,7 +174,9 @@ def make_room(
         _remove_bag(bag)
         excess -= sizes[bag]
         removed.append(bag)
-    for file in sorted(current.glob('*.mcap'), key=_age):
+    recordings = sorted(current.glob('*.rrd'), key=_age)
+    # The newest recording is being written, whatever it is called.
+    for file in sorted([*current.glob('*.mcap'), *recordings[:-1]], key=_age):
         if excess > 0 and file not in keep:
             excess -= _size(file)
             file.unlink(missing_ok=True)
