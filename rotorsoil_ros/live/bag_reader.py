@@ -1,8 +1,10 @@
 """What does a bag hold? Its messages in the order in which they were received, chunk by chunk."""
 
-from collections.abc import Callable, Iterator
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import io
+from itertools import groupby, pairwise
 from pathlib import Path
 import re
 import struct
@@ -14,7 +16,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, Schema
+from mcap.records import Channel, Chunk, ChunkIndex, Schema
+from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 import yaml
 import zstandard
@@ -26,6 +29,7 @@ RECORD_HEADER = struct.Struct('<BQ')
 MESSAGE_HEADER = struct.Struct('<HIQQ')
 LARGEST_RECORD = 1 << 28  # [bytes]; a file that claims more is broken or hostile
 LAST_STAMP = (1 << 63) - 1
+MOST_WAITING = 1 << 18  # messages of chunks that overlap; beyond, order gives way to memory
 LOOSE = 1000  # messages without a chunk are handed on in portions of so many
 BROKEN = (McapError, struct.error, zstandard.ZstdError, RuntimeError, UnicodeDecodeError,
           OverflowError)
@@ -66,19 +70,40 @@ def messages(path: Path, wanted: Wanted) -> Iterator[tuple[Source, int, bytes]]:
             yield from chunk
 
 
-def batches(path: Path, wanted: Wanted, *, at_most: int) -> Iterator[Records]:
-    """Read wanted messages as batches of one topic; memory does not grow with the bag."""
+def batches(
+    path: Path, wanted: Wanted, *, at_most: int, span_ns: int = LAST_STAMP,
+) -> Iterator[Records]:
+    """
+    Read wanted messages as batches of one topic; memory does not grow with the bag.
+
+    Parameters
+    ----------
+    path : Path
+        Bag directory or MCAP file.
+    wanted : callable
+        Whether a topic of a type is wanted.
+    at_most : int
+        Messages in a batch.
+    span_ns : int
+        Topics are apart by no more than this [ns]: where it matters what is told together.
+
+    """
     for file in files(path):
         for chunk in _chunks(file, wanted):
-            by_source: dict[Source, list[Entry]] = {}
-            for entry in chunk:
-                by_source.setdefault(entry[0], []).append(entry)
-            longest = max(map(len, by_source.values()), default=0)
-            for start in range(0, longest, at_most):
-                for source, entries in by_source.items():
-                    if part := entries[start:start + at_most]:
-                        yield Records(source.topic, source.type, [time for _, time, _ in part],
-                                      [payload for _, _, payload in part])
+            for _, span in groupby(chunk, key=lambda entry: entry[1] // span_ns):
+                yield from _by_topic(list(span), at_most)
+
+
+def _by_topic(entries: Sequence[Entry], at_most: int) -> Iterator[Records]:
+    by_source: dict[Source, list[Entry]] = {}
+    for entry in entries:
+        by_source.setdefault(entry[0], []).append(entry)
+    longest = max(map(len, by_source.values()), default=0)
+    for start in range(0, longest, at_most):
+        for source, own in by_source.items():
+            if part := own[start:start + at_most]:
+                yield Records(source.topic, source.type, [time for _, time, _ in part],
+                              [payload for _, _, payload in part])
 
 
 def files(path: Path) -> list[Path]:
@@ -136,14 +161,42 @@ def opened(file: Path) -> Iterator[BinaryIO]:
 
 
 def _chunks(file: Path, wanted: Wanted) -> Iterator[list[Entry]]:
-    """Read a file chunk by chunk, wanted messages only."""
+    """Read wanted messages chunk by chunk; chunks that overlap in time are merged."""
     contents = Contents(wanted)
     with opened(file) as stream:
+        summary = SeekingReader(stream, record_size_limit=LARGEST_RECORD).get_summary()
+        if summary is not None and _overlap(summary.chunk_indexes):
+            yield from _merged(stream, summary, contents)
+            return
         stream.seek(len(MCAP0_MAGIC))
         while (opcode := contents.read(stream)) not in (Opcode.DATA_END, Opcode.FOOTER):
             if opcode == Opcode.CHUNK or len(contents.entries) >= LOOSE:
                 yield contents.take()
         yield contents.take()
+
+
+def _overlap(indexes: Sequence[ChunkIndex]) -> bool:
+    return any(after.message_start_time < before.message_end_time
+               for before, after in pairwise(indexes))
+
+
+def _merged(stream: BinaryIO, summary: Summary, contents: 'Contents') -> Iterator[list[Entry]]:
+    """Read chunks in the order of their first messages, and messages in that of their times."""
+    contents.learn(summary)
+    waiting: list[Entry] = []
+    for index in sorted(summary.chunk_indexes, key=lambda index: index.message_start_time):
+        waiting.sort(key=_time)
+        cut = bisect_left(waiting, index.message_start_time, key=_time)
+        cut = max(cut, len(waiting) - MOST_WAITING)
+        yield waiting[:cut]
+        stream.seek(index.chunk_start_offset)
+        contents.read(stream)
+        waiting = waiting[cut:] + contents.take()
+    yield sorted(waiting, key=_time)
+
+
+def _time(entry: Entry) -> int:
+    return entry[1]
 
 
 class Contents:
@@ -159,6 +212,12 @@ class Contents:
         """Hand over what was read."""
         entries, self.entries = self.entries, []
         return entries
+
+    def learn(self, summary: Summary) -> None:
+        """Take schemas and channels from the summary: chunks will not come in their order."""
+        self._schemas |= {number: schema.name for number, schema in summary.schemas.items()}
+        for channel in summary.channels.values():
+            self._announce(channel)
 
     def read(self, stream: BinaryIO) -> int:
         """Read the next record of the file and return its kind."""
@@ -191,10 +250,12 @@ class Contents:
             schema = Schema.read(ReadDataStream(io.BytesIO(body[at:at + length])))
             self._schemas[schema.id] = schema.name
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(ReadDataStream(io.BytesIO(body[at:at + length])))
-            if channel.id not in self._sources:
-                self._sources[channel.id] = Source(
-                    channel.topic, self._schemas.get(channel.schema_id, ''), self._wanted)
+            self._announce(Channel.read(ReadDataStream(io.BytesIO(body[at:at + length]))))
+
+    def _announce(self, channel: Channel) -> None:
+        if channel.id not in self._sources:
+            self._sources[channel.id] = Source(
+                channel.topic, self._schemas.get(channel.schema_id, ''), self._wanted)
 
 
 def unpacked(content: bytes) -> bytes:

@@ -1,6 +1,6 @@
 """Which once-per-turn vector is in raw samples? Found while they come."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 import math
 
 import numpy as np
@@ -9,7 +9,7 @@ from rotorsoil_ros.live.events import Demodulated, NANOSECONDS, Samples
 from rotorsoil_ros.live.history import History
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.errors import NotSolvedError
-from rotorsoil_ros.physics.orders import demodulate, OrderVector, SpeedTrack
+from rotorsoil_ros.physics.orders import demodulate, OrderVector
 from rotorsoil_ros.physics.units import RADIANS_PER_TURN
 
 FITTED = (1, 2, 3)  # a harmonic that is there and not fitted would disturb the others
@@ -27,7 +27,6 @@ class Demodulator:
         self._parts: list[tuple[IntArray, FloatArray]] = []
         self._count = 0
         self._done_ns = -1
-        self.has_phase = False
         self.left_out = 0
 
     def take(self, samples: Samples) -> None:
@@ -41,20 +40,22 @@ class Demodulator:
 
     def vectors(self) -> Iterator[Demodulated]:
         """Yield the vectors of all stretches that are complete."""
-        zero_ns = self._history.last_ns
-        track = self._history.speed_track(zero_ns)
-        if not self._parts or track is None:
+        told = self._history.track()[0]
+        if not self._parts or not len(told):
             return
-        stamps, values = self._gathered(zero_ns + round(track.time[0] * NANOSECONDS))
-        known = np.searchsorted(stamps, zero_ns, side='right')
-        found: list[OrderVector] = []
-        if known:
-            found, rest = self._solved(stamps[:known], values[:known], track, zero_ns)
-            stamps, values = stamps[rest:], values[rest:]
+        stamps, values = self._gathered(int(told[0]))
+        found = []
+        while (known := int(np.searchsorted(stamps, told[-1], side='right'))):
+            vector, taken = self._first(stamps[:known], values[:known])
+            if not taken:
+                break
+            self._done_ns = int(stamps[taken - 1])
+            stamps, values = stamps[taken:], values[taken:]
+            if vector is not None:
+                found.append(vector)
         self._parts, self._count = [(stamps, values)], len(stamps)
         if found:
-            self.has_phase = found[-1].has_phase
-            yield self._event(found, zero_ns)
+            yield self._event(found)
 
     def _gathered(self, begin_ns: int) -> tuple[IntArray, FloatArray]:
         """Return what has been kept, in order; too late or before every speed is left out."""
@@ -66,31 +67,30 @@ class Demodulator:
         order = np.argsort(stamps, kind='stable')
         return stamps[order], values[order]
 
-    def _solved(
-        self, stamps: IntArray, values: FloatArray, track: SpeedTrack, zero_ns: int,
-    ) -> tuple[list[OrderVector], int]:
-        """Return the vectors of complete stretches, and how many samples those took."""
+    def _first(
+        self, stamps: IntArray, values: FloatArray,
+    ) -> tuple[tuple[int, OrderVector] | None, int]:
+        """Return stamp and vector of the first stretch, and how many samples it takes."""
+        # Counted from its own first sample, it does not matter when this is asked.
+        track, zero_ns = self._history.speed_track(int(stamps[0]))
+        if track is None:
+            return None, 0
         time = (stamps - zero_ns) / NANOSECONDS
         angle, _, _ = track.at(time)
-        stretch = np.floor((angle - angle[0]) / (self._turns * RADIANS_PER_TURN))
-        starts = np.flatnonzero(np.diff(stretch)) + 1
-        found = []
-        for begin, end in zip([0, *starts[:-1].tolist()], starts.tolist(), strict=False):
-            try:
-                found.append(demodulate(time[begin:end], values[begin:end], track,
-                                        orders=FITTED))
-            except NotSolvedError:
-                self.left_out += end - begin
-        rest = int(starts[-1]) if len(starts) else 0
-        if rest:
-            self._done_ns = int(stamps[rest - 1])
-        return found, rest
+        end = int(np.argmax(angle - angle[0] >= self._turns * RADIANS_PER_TURN))
+        if not end:
+            return None, 0
+        try:
+            vector = demodulate(time[:end], values[:end], track, orders=FITTED)
+        except NotSolvedError:
+            self.left_out += end
+            return None, end
+        return (zero_ns + round(vector.time * NANOSECONDS), vector), end
 
-    def _event(self, found: list[OrderVector], zero_ns: int) -> Demodulated:
-        vectors = np.array([vector.displacement[:TOLD] for vector in found])
-        told = np.array([[0.0 if vector.has_phase else math.nan] for vector in found])
+    def _event(self, found: Sequence[tuple[int, OrderVector]]) -> Demodulated:
+        vectors = np.array([vector.displacement[:TOLD] for _, vector in found])
+        told = np.array([[0.0 if vector.has_phase else math.nan] for _, vector in found])
         return Demodulated(
-            self._machine, self._channel,
-            np.array([zero_ns + round(vector.time * NANOSECONDS) for vector in found]),
-            np.array([vector.speed for vector in found]), FITTED[:TOLD], np.abs(vectors),
-            np.angle(vectors) + told, np.array([vector.deviation[0] for vector in found]))
+            self._machine, self._channel, np.array([stamp for stamp, _ in found]),
+            np.array([vector.speed for _, vector in found]), FITTED[:TOLD], np.abs(vectors),
+            np.angle(vectors) + told, np.array([vector.deviation[0] for _, vector in found]))

@@ -2,6 +2,7 @@
 
 from collections import deque
 import math
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ LATEST = 256  # speeds kept as they came
 TRACK = 4096  # and such as lie a while apart
 TRACK_NS = NANOSECONDS // 100
 STEADY_S = 2.0
+ROW = np.dtype([('stamp_ns', '<i8'), ('speed', '<f8'), ('angle', '<f8')])
 
 
 class History:
@@ -26,6 +28,7 @@ class History:
     def __init__(self) -> None:
         self._latest: deque[tuple[int, float]] = deque(maxlen=LATEST)
         self._track: deque[tuple[int, float, float]] = deque(maxlen=TRACK)
+        self._arrays: tuple[Any, ...] | None = None
         self.last_ns = -1
         self._thinned_ns = -TRACK_NS
 
@@ -42,11 +45,13 @@ class History:
             if stamp - self._thinned_ns >= TRACK_NS:
                 self._thinned_ns = stamp
                 self._track.append(row)
+                self._arrays = None
 
     def forget(self) -> None:
         """Begin anew."""
         self._latest.clear()
         self._track.clear()
+        self._arrays = None
         self.last_ns, self._thinned_ns = -1, -TRACK_NS
 
     def speed_near(self, stamp_ns: int, *, tolerance_ns: float) -> float:
@@ -65,18 +70,22 @@ class History:
 
     def track(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return stamps [ns], ascending, speeds [rad/s] and angles [rad], at most 4096."""
-        if not self._track:
-            return np.array([], dtype=np.int64), np.array([]), np.array([])
-        stamps, speed, angle = zip(*self._track, strict=True)
-        return np.array(stamps, dtype=np.int64), np.array(speed), np.array(angle)
+        if self._arrays is None:
+            rows = np.array(self._track, dtype=ROW)
+            self._arrays = tuple(np.ascontiguousarray(rows[name]) for name in ROW.names or ())
+        stamps, speed, angle = self._arrays
+        return stamps, speed, angle
 
-    def speed_track(self, zero_ns: int) -> SpeedTrack | None:
-        """Return the track in seconds since a stamp; None while there is none."""
+    def speed_track(self, from_ns: int) -> tuple[SpeedTrack | None, int]:
+        """Return the track from a stamp on, and the stamp [ns] from which it counts seconds."""
         stamps, speed, angle = self.track()
+        first = max(0, int(np.searchsorted(stamps, from_ns, side='right')) - 1)
+        stamps, speed, angle = stamps[first:], speed[first:], angle[first:]
         if len(stamps) < 2:
-            return None
-        time = (stamps - zero_ns) / NANOSECONDS
-        return SpeedTrack(time, speed, angle=angle if turns_with(time, speed, angle) else None)
+            return None, from_ns
+        time = (stamps - stamps[0]) / NANOSECONDS
+        angles = angle if turns_with(time, speed, angle) else None
+        return SpeedTrack(time, speed, angle=angles), int(stamps[0])
 
     def rate(self, over_s: float) -> float:
         """Return how fast the speed changed lately [rad/s^2]: a line through the last seconds."""

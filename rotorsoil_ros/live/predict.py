@@ -16,9 +16,11 @@ from rotorsoil_ros.live.judge import Judging
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Encoder, Messenger, Records, Topics
 from rotorsoil_ros.live.monitor import Monitor
-from rotorsoil_ros.live.profile import BATCH, Place, place
+from rotorsoil_ros.live.profile import Place, place
 from rotorsoil_ros.live.run_log import open_viewer
 from rotorsoil_ros.physics.errors import InputError
+
+AT_ONCE = 128  # speeds; measurements of the same time must find them
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,8 @@ def predict(
             machine.case, machine.model, machine.case.unbalance, machine.directory))
         inlets = {topic: inlet(found.name, topic, monitor, rotor_joint=rotor_joint, log=log.write)
                   for topic, (found, _) in inputs.items()}
-        batches = bag_reader.batches(profile, lambda topic, _: topic in inputs, at_most=BATCH)
+        batches = bag_reader.batches(profile, lambda topic, _: topic in inputs,
+                                     at_most=AT_ONCE, span_ns=NANOSECONDS)
         total, done = sum(number for _, number in inputs.values()), 0
         description = machine.description(name, machine.case.unbalance)
         for number in _feed(batches, inlets, monitor, description):
@@ -88,17 +91,17 @@ def _feed(
     batches: Iterable[Records], inlets: Mapping[str, Inlet],
     monitor: Monitor, description: Mapping[str, object],
 ) -> Iterator[int]:
-    """Hand batches to their inlets, ticking with the time of the messages; yield their sizes."""
-    tick_ns = now_ns = None
+    """Hand batches to their inlets, ticking at every full second of their time; yield sizes."""
+    second = now_ns = None
     for batch in batches:
-        if tick_ns is None:
-            tick_ns = batch.log_time_ns[0]
-            monitor.begin(tick_ns, description)
+        if now_ns is None:
+            monitor.begin(batch.log_time_ns[0], description)
+        elif batch.log_time_ns[0] // NANOSECONDS != second:
+            monitor.tick(batch.log_time_ns[0] // NANOSECONDS * NANOSECONDS,
+                         stale_after_s=math.inf)
+        second = batch.log_time_ns[0] // NANOSECONDS
         inlets[batch.topic](batch.log_time_ns, batch.payloads)
         now_ns = batch.log_time_ns[-1]
-        if now_ns - tick_ns >= NANOSECONDS:
-            monitor.tick(now_ns, stale_after_s=math.inf)
-            tick_ns = now_ns
         yield len(batch.payloads)
     if now_ns is not None:
         monitor.tick(now_ns, stale_after_s=math.inf)

@@ -72,7 +72,7 @@ class Verdict:
                              f'{channel}: zone {state.zone}{came}, '
                              f'{MM * state.velocity:.2f} mm/s rms')
         for channel, is_outside in self._vibration.settle():
-            said = 'outside' if is_outside else 'inside again'
+            said = 'has left' if is_outside else 'is back in'
             share = 100.0 * self._vibration.share_inside(channel)
             yield Remark(self._machine, now_ns, Level.WARN if is_outside else Level.OK,
                          f'{channel}: {said} the band of the prediction, {share:.0f} % of the '
@@ -90,8 +90,9 @@ class Verdict:
             if not is_steady and level is Level.ERROR:
                 level = Level.WARN
                 said.append('speed changes')
-        faults = [f'outside the band: {channel}' for channel in sorted(self._vibration.outside)]
-        faults += self._passing.faults
+        faults = list(self._passing.faults)
+        if self._vibration.outside:
+            faults.insert(0, f'outside the band: {", ".join(sorted(self._vibration.outside))}')
         if faults:
             level = max(level, Level.WARN)
         return level, '; '.join([*said, *faults]) or 'compared with the prediction'

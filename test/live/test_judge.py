@@ -442,7 +442,7 @@ def test_leaving_the_band_is_told_once_and_coming_back_too(run):
     assert run.vibration()[-1].level is Level.OK
     said = [event.text for event in run.of(Remark) if 'band' in event.text]
     assert [text.split(' the band')[0] for text in said] == [
-        f'{X}: outside', f'{X}: inside again']
+        f'{X}: has left', f'{X}: is back in']
 
 
 PEAKED = 'fan_end_housing_x'  # highest at 136.5 rad/s

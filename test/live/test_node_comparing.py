@@ -1,4 +1,4 @@
-"""The node compares over real DDS: residual, band, zones and events reach the graph and the log."""
+"""The node compares over real DDS: residual, band, zones and events reach graph and log."""
 
 import math
 from pathlib import Path
@@ -175,7 +175,7 @@ def test_raw_samples_are_heard_as_soon_as_a_sensor_publishes_them(plant):
 
 
 def test_everything_that_is_compared_is_in_the_log(graph, fan, tmp_path):
-    plant = Plant(graph, fan, **{'log__directory': str(tmp_path)})
+    plant = Plant(graph, fan, log__directory=str(tmp_path))
     heard = plant.hear('/rotorsoil/fan/residual')
     plant.stamp = 10.0
     plant.turns()
