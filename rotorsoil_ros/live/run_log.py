@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from rotorsoil_ros.live.aside import Aside
+from rotorsoil_ros.live.bag_aside import BagAside
 from rotorsoil_ros.live.bag_writer import new_directory
 from rotorsoil_ros.live.events import Diagnostics, Event
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Records
 from rotorsoil_ros.live.recorder import Recorder
-from rotorsoil_ros.live.recording import Recording
 from rotorsoil_ros.live.shelf import Recovery
 from rotorsoil_ros.physics.errors import InputError
 
@@ -58,7 +58,7 @@ class RunLog:
     ) -> None:
         self.path: Path | None = None
         self._complain = complain
-        self._recording: Recording | None = None
+        self._bag: BagAside | None = None
         self._recovery: Recovery | None = None
         self._viewer: Aside[Event | Path] | None = None
         self._shown_file: Path | None = None
@@ -67,17 +67,17 @@ class RunLog:
             self.path = new_directory(directory, settings.name)
             self._recovery = Recovery(directory, tell=tell, complain=complain)
         if self.path and settings.mcap:
-            self._recording = Recording(Recorder(
+            self._bag = BagAside(Recorder(
                 self.path, split_mib=settings.split_mib, split_s=settings.split_s,
                 budget_mib=settings.budget_mib, tell=tell, complain=complain), complain=complain)
-            self._shown_file = self._recording.file if settings.rerun else None
+            self._shown_file = self._bag.file if settings.rerun else None
         if (self.path and settings.rerun) or settings.rerun_url:
             self._viewer = self._open_viewer(settings, machines)
 
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
-        if self._recording is not None:
-            self._recording.write(records)
+        if self._bag is not None:
+            self._bag.write(records)
 
     def show(self, event: Event) -> None:
         """Show an event in the viewer."""
@@ -86,9 +86,9 @@ class RunLog:
 
     def flush(self, *, wait_s: float = 0.0) -> None:
         """Put everything onto the disk, waiting for room if asked to; called once a second."""
-        if self._recording is not None:
-            self._recording.flush(wait_s=wait_s)
-            self._follow(self._recording.file)
+        if self._bag is not None:
+            self._bag.flush(wait_s=wait_s)
+            self._follow(self._bag.file)
         if self._viewer is not None:
             self._viewer.flush()
         if self._recovery is not None:
@@ -96,15 +96,15 @@ class RunLog:
 
     def report(self, now_ns: int) -> Diagnostics | None:
         """Tell how logging goes, if anything is logged."""
-        return self._recording.report(now_ns) if self._recording is not None else None
+        return self._bag.report(now_ns) if self._bag is not None else None
 
     def close(self) -> None:
         """Finish bag and recording."""
         viewer, self._viewer = self._viewer, None
-        recording, self._recording = self._recording, None
+        bag, self._bag = self._bag, None
         recovery, self._recovery = self._recovery, None
-        if recording is not None:
-            recording.close()
+        if bag is not None:
+            bag.close()
         if recovery is not None:
             recovery.close()
         if viewer is not None:

@@ -30,7 +30,7 @@ def pass_time(log, machine, number):
     log.show(predicted(machine, np.full(10, 300.0), start=before, period=SECOND // 10))
     log.flush()
     deadline = time.monotonic() + DEADLINE_S
-    while log._recording.file.name == f'run_{number}.mcap':
+    while log._bag.file.name == f'run_{number}.mcap':
         assert time.monotonic() < deadline, 'the bag was not split'
 
 

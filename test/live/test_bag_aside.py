@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from rotorsoil_ros.live import bag_reader
+from rotorsoil_ros.live.bag_aside import BACKLOG, BagAside, BATCH
 from rotorsoil_ros.live.bag_writer import new_directory
 from rotorsoil_ros.live.events import Level
 from rotorsoil_ros.live.recorder import Recorder
-from rotorsoil_ros.live.recording import BACKLOG, BATCH, Recording
 
 from test_bag import joint_records, read_all, START, string_records
 
@@ -32,7 +32,7 @@ class Desk:
                                  complain=self.complaints.append)
         self._write = self.recorder._bag._file._stream.write
         self.recorder._bag._file._writer._stream = self
-        self.recording = Recording(self.recorder, complain=self.complaints.append)
+        self.aside = BagAside(self.recorder, complain=self.complaints.append)
 
     def write(self, content):
         """Write as a stream does, once the disk goes."""
@@ -44,15 +44,15 @@ class Desk:
         """Let the disk hang, and wait until the thread hangs with it."""
         self.goes.clear()
         self.is_held.clear()
-        self.recording.write(joint_records(1))
-        self.recording.flush()
+        self.aside.write(joint_records(1))
+        self.aside.flush()
         assert self.is_held.wait(DEADLINE_S)
 
     def until(self, holds):
         deadline = time.monotonic() + DEADLINE_S
         while not holds():
             assert time.monotonic() < deadline
-            self.recording.flush()
+            self.aside.flush()
 
 
 @pytest.fixture
@@ -60,15 +60,15 @@ def desk(tmp_path):
     desk = Desk(tmp_path)
     yield desk
     desk.goes.set()
-    desk.recording.close()
+    desk.aside.close()
 
 
 def test_all_that_came_is_logged_in_its_order_when_the_run_ends(desk, tmp_path):
     sent = [joint_records(1, start=START + step * 10**6, topic=f'/{step % 3}')
             for step in range(2 * BATCH + 10)]
     for records in sent:
-        desk.recording.write(records)
-    desk.recording.close()
+        desk.aside.write(records)
+    desk.aside.close()
     with (tmp_path / 'run' / 'run_0.mcap').open('rb') as stream:
         found = [(channel.topic, message.log_time, message.data) for _, channel, message in
                  NonSeekingReader(stream).iter_messages(log_time_order=False)]
@@ -78,10 +78,10 @@ def test_all_that_came_is_logged_in_its_order_when_the_run_ends(desk, tmp_path):
 
 
 def test_a_second_is_on_the_disk_when_the_thread_has_taken_it(desk, tmp_path):
-    desk.recording.write(joint_records(10))
-    desk.recording.flush()
-    desk.until(lambda: desk.recording.report(5).values['written'] == 10)
-    assert desk.recording.report(5).stamp_ns == 5
+    desk.aside.write(joint_records(10))
+    desk.aside.flush()
+    desk.until(lambda: desk.aside.report(5).values['written'] == 10)
+    assert desk.aside.report(5).stamp_ns == 5
     with (tmp_path / 'run' / 'run_0.mcap').open('rb') as stream:  # nothing was closed
         messages = NonSeekingReader(stream).iter_messages(log_time_order=False)
         assert len(list(islice(messages, 10))) == 10
@@ -90,17 +90,17 @@ def test_a_second_is_on_the_disk_when_the_thread_has_taken_it(desk, tmp_path):
 def test_a_disk_that_hangs_holds_nobody_up_and_costs_a_gap_of_what_found_no_room(desk, tmp_path):
     desk.hold()
     for second in range(BACKLOG + 3):
-        desk.recording.write(joint_records(10, start=START + (1 + second) * SECOND))
-        desk.recording.write(string_records(start=START + second))
-        desk.recording.flush()
-    assert desk.recording.report(0).level is Level.ERROR
-    assert desk.recording._aside._batches.qsize() == BACKLOG
-    assert len(desk.recording._waiting) == 1  # the last model: it costs nothing to keep
+        desk.aside.write(joint_records(10, start=START + (1 + second) * SECOND))
+        desk.aside.write(string_records(start=START + second))
+        desk.aside.flush()
+    assert desk.aside.report(0).level is Level.ERROR
+    assert desk.aside._aside._batches.qsize() == BACKLOG
+    assert len(desk.aside._waiting) == 1  # the last model: it costs nothing to keep
     assert desk.complaints == ['the log does not keep up: not all of the run is logged']
     desk.goes.set()
     desk.until(lambda: desk.told)
-    desk.recording.write(joint_records(10, start=START + 99 * SECOND))
-    desk.recording.close()
+    desk.aside.write(joint_records(10, start=START + 99 * SECOND))
+    desk.aside.close()
     assert len(desk.complaints) == 1
     first, second = bag_reader.files(tmp_path / 'run')
     assert [time for topic, time, _ in read_all(first) if 'joint' in topic] == [START] + [
@@ -120,7 +120,7 @@ def test_a_disk_that_hangs_holds_nobody_up_and_costs_a_gap_of_what_found_no_room
 
 
 def test_a_disk_that_hangs_at_the_end_is_left_alone(desk, monkeypatch):
-    monkeypatch.setattr(desk.recording._aside, '_patience_s', 0.05)
+    monkeypatch.setattr(desk.aside._aside, '_patience_s', 0.05)
     desk.hold()
-    desk.recording.close()
+    desk.aside.close()
     assert desk.complaints == ['the log did not finish within 0.05 s and is left alone']
