@@ -11,7 +11,7 @@ from rotorsoil_ros.physics.passages import Passage, PeakPair
 
 HEADER = ('stamp_ns', 'channel', 'speed_rad_s', 'measured_amplitude', 'measured_phase_rad',
           'predicted_amplitude', 'predicted_phase_rad', 'band_low', 'band_high',
-          'residual_amplitude', 'used', 'reason')
+          'band_behind_rad', 'band_ahead_rad', 'residual_amplitude', 'used', 'reason')
 
 
 def rows(comparison: Comparison) -> Iterator[tuple[str, ...]]:
@@ -20,7 +20,8 @@ def rows(comparison: Comparison) -> Iterator[tuple[str, ...]]:
         residual = np.abs(points.measured - points.predicted)
         numbers = np.stack([
             points.speed, points.amplitude, points.phase, np.abs(points.predicted),
-            np.angle(points.predicted), points.low, points.high, residual], axis=1)
+            np.angle(points.predicted), points.low, points.high, points.behind,
+            points.ahead, residual], axis=1)
         for stamp, values, reason in zip(
                 points.stamp_ns.tolist(), numbers.tolist(), points.reason, strict=True):
             yield (str(stamp), points.channel,
@@ -56,6 +57,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
             'bias': figures.bias, 'scatter': figures.scatter, 'ratio': figures.ratio,
             'phase_bias_rad': figures.phase_bias, 'phase_scatter_rad': figures.phase_scatter,
             'r_squared': figures.r_squared, 'share_inside_band': figures.inside,
+            'share_inside_phase_band': figures.phase_inside,
         } for points, figures in zip(comparison.points, comparison.statistics, strict=True)},
         'critical_speeds': [{
             'speed_rad_s': mode.speed, 'damping_ratio': mode.damping_ratio, 'whirl': mode.whirl,

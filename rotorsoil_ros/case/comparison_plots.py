@@ -53,7 +53,7 @@ def bode(comparison: Comparison, points: ChannelPoints, envelope: Envelope | Non
     figure = Figure(figsize=(7.5, 5.4), layout='constrained')
     amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
     _draw_prediction(amplitude, phase, comparison, points)
-    _draw_band(amplitude, points)
+    _draw_band(amplitude, phase, points)
     measured = _MICRO * points.amplitude
     speed = rad_s_to_rpm(points.speed)
     for chosen, style in _kinds(points):
@@ -115,15 +115,20 @@ def _last_unbalance(comparison: Comparison, expectation: Expectation) -> Any:
     return expectation.vector(logged[-1][1]) if logged else expectation.case.unbalance
 
 
-def _draw_band(amplitude: Axes, points: ChannelPoints) -> None:
-    given = np.isfinite(points.low)
-    if not given.any():
+def _draw_band(amplitude: Axes, phase: Axes, points: ChannelPoints) -> None:
+    given = np.flatnonzero(np.isfinite(points.low))
+    if not len(given):
         return
-    order = np.argsort(points.speed[given], kind='stable')
-    amplitude.fill_between(
-        rad_s_to_rpm(points.speed[given][order]), _MICRO * points.low[given][order],
-        _MICRO * points.high[given][order], color=PREDICTED, alpha=0.18, linewidth=0.0,
-        label='as far as the soil is known')
+    given = given[np.argsort(points.speed[given], kind='stable')]
+    speed = rad_s_to_rpm(points.speed[given])
+    style: dict[str, Any] = {'color': PREDICTED, 'alpha': 0.18, 'linewidth': 0.0}
+    amplitude.fill_between(speed, _MICRO * points.low[given], _MICRO * points.high[given],
+                           label='as far as the soil is known', **style)
+    middle = np.unwrap(np.angle(points.predicted[given]))
+    low, high = (np.rad2deg(middle + end[given]) for end in (points.behind, points.ahead))
+    turns = range(math.floor(low.min() / 360.0) - 1, math.ceil(high.max() / 360.0) + 2)
+    for turn in turns:  # what leaves the axes at one end enters at the other
+        phase.fill_between(speed, low - 360.0 * turn, high - 360.0 * turn, **style)
 
 
 def _kinds(points: ChannelPoints) -> Iterator[tuple[BoolArray, dict[str, Any]]]:

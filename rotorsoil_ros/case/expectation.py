@@ -121,7 +121,7 @@ class Expectation:
         """
         shape = len(speed), len(self.table.channels)
         displacement = np.full(shape, complex(np.nan, np.nan))
-        low, high = np.full(shape, np.nan), np.full(shape, np.nan)
+        bounds = np.full((4, *shape), np.nan)
         starts = np.searchsorted(stamp_ns, [start for start, _ in unbalances])
         starts[0] = 0
         for begin, end, (_, unbalance) in zip(
@@ -131,9 +131,9 @@ class Expectation:
                 displacement[part] = answer(self.table.predictor(unbalance), speed[part])
             if self.band is not None and begin < end:
                 envelope = self.envelope(unbalance).at(speed[part])
-                low[part], high[part] = envelope.low, envelope.high
+                bounds[:, part] = (envelope.low, envelope.high, envelope.behind, envelope.ahead)
         return Reference(stamp_ns, speed, self.table.channels,
-                         displacement if logged is None else logged, low, high,
+                         displacement if logged is None else logged, *bounds,
                          self.table.speed_range)
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:

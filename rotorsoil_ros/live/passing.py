@@ -48,15 +48,17 @@ class Trace:
 
     def points(self, channel: str) -> ChannelPoints:
         """Return it as what the comparison of a whole run looks at."""
+        nothing = np.full(len(self.speed), np.nan)
         used = np.full(len(self.speed), Reason.USED, dtype=object)
         return ChannelPoints(
             channel, self.stamp_ns, self.speed, self.amplitude, self.phase, self.predicted,
-            self.low, self.high, used, complex(np.nan, np.nan))
+            self.low, self.high, nothing, nothing, used, complex(np.nan, np.nan))
 
     def reference(self, channel: str) -> Reference:
         """Return its prediction."""
+        nothing = np.full((len(self.speed), 1), np.nan)
         return Reference(self.stamp_ns, self.speed, (channel,), self.predicted[:, None],
-                         self.low[:, None], self.high[:, None], (0.0, np.inf))
+                         self.low[:, None], self.high[:, None], nothing, nothing, (0.0, np.inf))
 
 
 _NAMES = tuple(entry.name for entry in fields(Trace))

@@ -79,6 +79,8 @@ class Reference:
         NaN where there is no prediction [m, rad].
     low, high : (m, c) float array
         Amplitudes between which it lies as far as the soil is known, NaN where no band is.
+    behind, ahead : (m, c) float array
+        By how much its phase lies behind or ahead at most [rad], likewise.
     speed_range : tuple of two floats
         That the prediction covers [rad/s].
 
@@ -90,6 +92,8 @@ class Reference:
     displacement: ComplexArray
     low: FloatArray
     high: FloatArray
+    behind: FloatArray
+    ahead: FloatArray
     speed_range: tuple[float, float]
 
     @property
@@ -145,6 +149,8 @@ class ChannelPoints:
         NaN where there is no prediction.
     low, high : (n,) float array
         The band of its amplitude, NaN where there is none.
+    behind, ahead : (n,) float array
+        The band of its phase about that of the prediction [rad], likewise.
     reason : (n,) array of Reason
         Why a point is not used; USED where it is.
     runout : complex
@@ -160,6 +166,8 @@ class ChannelPoints:
     predicted: ComplexArray
     low: FloatArray
     high: FloatArray
+    behind: FloatArray
+    ahead: FloatArray
     reason: _Reasons
     runout: complex
 
@@ -230,9 +238,10 @@ def _channel(
 
     nothing = np.full(len(reference.stamp_ns), np.nan)
     column = reference.channels.index(name) if name in reference.channels else -1
-    predicted, low, high = (
+    predicted, low, high, behind, ahead = (
         matched(nothing if column < 0 else values[:, column])
-        for values in (reference.displacement, reference.low, reference.high))
+        for values in (reference.displacement, reference.low, reference.high, reference.behind,
+                       reference.ahead))
     speed = matched(reference.speed)
     amplitude, phase = signal.amplitude, signal.phase
     rolling = (np.abs(speed - matching.slow_roll_speed)
@@ -258,7 +267,7 @@ def _channel(
             (Reason.NOT_FINITE, ~np.isfinite(amplitude))):
         reason[holds] = why
     return ChannelPoints(name, signal.stamp_ns, speed, amplitude, phase, predicted, low, high,
-                         reason, runout)
+                         behind, ahead, reason, runout)
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,6 +288,9 @@ class Statistics:
         phases, else of the amplitudes.
     inside : float
         Share of the amplitudes inside the band, widened by a margin on either side.
+    phase_inside : float
+        Share of the phases inside the band, widened by the angle of which the margin is the
+        sine.
 
     """
 
@@ -289,6 +301,7 @@ class Statistics:
     phase_scatter: float
     r_squared: float
     inside: float
+    phase_inside: float
 
 
 def statistics(points: ChannelPoints, *, margin: float) -> Statistics:
@@ -296,7 +309,7 @@ def statistics(points: ChannelPoints, *, margin: float) -> Statistics:
     used = points.used
     size, expected = points.amplitude[used], np.abs(points.predicted[used])
     if not len(size):
-        return Statistics(*[math.nan] * 7)
+        return Statistics(*[math.nan] * 8)
     turn = np.exp(1j * (points.phase[used] - np.angle(points.predicted[used])))
     turn = turn[np.isfinite(turn)]
     mean_turn = turn.mean() if len(turn) else complex(np.nan, np.nan)
@@ -316,4 +329,16 @@ def statistics(points: ChannelPoints, *, margin: float) -> Statistics:
         phase_scatter=(float(np.std(np.angle(turn * mean_turn.conjugate()))) if len(turn)
                        else math.nan),
         r_squared=1.0 - left / spread if spread > 0.0 else math.nan,
-        inside=float(np.mean(inside[banded])) if banded.any() else math.nan)
+        inside=float(np.mean(inside[banded])) if banded.any() else math.nan,
+        phase_inside=_phase_inside(points, margin))
+
+
+def _phase_inside(points: ChannelPoints, margin: float) -> float:
+    """Return the share of used phases inside their band, NaN where there is none."""
+    told = points.used & np.isfinite(points.phase) & np.isfinite(points.behind)
+    if not told.any():
+        return math.nan
+    turn = np.angle(np.exp(1j * (points.phase - np.angle(points.predicted))))[told]
+    slack = math.asin(min(margin, 1.0))
+    return float(np.mean((turn >= points.behind[told] - slack)
+                         & (turn <= points.ahead[told] + slack)))

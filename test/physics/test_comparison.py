@@ -21,7 +21,7 @@ SECOND = 1_000_000_000
 TOLERANT = Matching(tolerance=0.02)
 
 
-def reference(speed, displacement, *, low=None, high=None, every=SECOND):
+def reference(speed, displacement, *, low=None, high=None, turn=None, every=SECOND):
     """Return predictions of one channel at evenly spaced stamps."""
     speed = np.asarray(speed, dtype=float)
     nothing = np.full((len(speed), 1), np.nan)
@@ -29,7 +29,9 @@ def reference(speed, displacement, *, low=None, high=None, every=SECOND):
         np.arange(len(speed)) * every, speed, ('a_x',),
         np.asarray(displacement, dtype=complex)[:, None],
         nothing if low is None else np.asarray(low)[:, None],
-        nothing if high is None else np.asarray(high)[:, None], (10.0, 100.0))
+        nothing if high is None else np.asarray(high)[:, None],
+        nothing if turn is None else -np.asarray(turn)[:, None],
+        nothing if turn is None else np.asarray(turn)[:, None], (10.0, 100.0))
 
 
 def signal(stamp_ns, vector, *, phase=True, deviation=0.0):
@@ -157,3 +159,15 @@ def test_channel_without_a_used_point_has_no_figures():
 def test_impossible_matching_is_refused(change, rule):
     with pytest.raises(RotorSoilError, match=rule):
         Matching(**change)
+
+
+def test_phases_count_inside_their_band_and_a_little_beside_it():
+    vector = np.full(6, 1e-5) * np.exp(3.0j)
+    turn = np.full(6, 0.2)
+    given = reference(np.full(6, 50.0), vector, low=np.full(6, 0.0), high=np.full(6, 1.0),
+                      turn=turn)
+    off = np.array([0.0, 0.19, -0.29, 0.31, -0.31, 2.0 * np.pi - 0.1])
+    points = points_of(given, signal(given.stamp_ns, vector * np.exp(1j * off)))
+    assert statistics(points, margin=0.1).phase_inside == pytest.approx(4 / 6)
+    blind = points_of(given, signal(given.stamp_ns, vector, phase=False))
+    assert np.isnan(statistics(blind, margin=0.1).phase_inside)
