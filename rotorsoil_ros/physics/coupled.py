@@ -22,7 +22,12 @@ from rotorsoil_ros.physics.whirl import WhirlModes
 UNBALANCE_FORCE = np.array([-1j, 1.0])
 
 # Speeds that are solved together: bounds memory, yet is long enough to hide Python.
-_CHUNK = 2048
+_CHUNK = 1024
+
+# Bytes of a block that is taken and given back untouched before a sweep: from then on the C
+# library keeps what is freed up to that size, where it would return every temporary array above
+# 128 KiB to the system and be handed it again, zeroed page by page, a quarter of the time.
+_KEPT = 1 << 24
 
 
 @dataclass(frozen=True)
@@ -254,6 +259,7 @@ class CoupledModel:
         self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, loads: ComplexArray,
     ) -> tuple[ComplexArray, ComplexArray]:
         """Solve, some frequencies at a time, and sort by channel: (n, c, k) each."""
+        np.empty(_KEPT, dtype=np.uint8)
         shape = (len(omega), len(self.channels), loads.shape[1])
         displacement = np.empty(shape, dtype=complex)
         force = np.full(shape, complex(np.nan, np.nan))
@@ -286,14 +292,18 @@ class CoupledModel:
 
     def bearing_coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return stiffness and damping of all bearings, (n, 2 b, 2 b) over (x, z) of each."""
-        size = 2 * len(self.rotor.bearings)
-        stiffness, damping = (np.zeros((len(speed), size, size)) for _ in range(2))
-        for index, bearing in enumerate(self.rotor.bearings):
+        bearings = self.rotor.bearings
+        # Without tables one row stands for all speeds, at no cost.
+        rows = speed if any(math.isfinite(one.speed_range[0]) for one in bearings) else speed[:1]
+        stiffness, damping = (np.zeros((len(rows), 2 * len(bearings), 2 * len(bearings)))
+                              for _ in range(2))
+        for index, bearing in enumerate(bearings):
             pair = slice(2 * index, 2 * index + 2)
-            stiffness[:, pair, pair], damping[:, pair, pair] = bearing.coefficients(speed)
-        return stiffness, damping
+            stiffness[:, pair, pair], damping[:, pair, pair] = bearing.coefficients(rows)
+        shape = (len(speed), *stiffness.shape[1:])
+        return np.broadcast_to(stiffness, shape), np.broadcast_to(damping, shape)
 
     def bearing_stiffness(self, omega: FloatArray, speed: FloatArray) -> ComplexArray:
         """Return the dynamic stiffness of all bearings, (n, 2 b, 2 b) over (x, z) of each."""
         stiffness, damping = self.bearing_coefficients(speed)
-        return np.asarray(stiffness + 1j * omega[:, None, None] * damping)
+        return np.asarray(stiffness + (1j * omega)[:, None, None] * damping)

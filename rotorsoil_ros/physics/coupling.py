@@ -75,12 +75,16 @@ def answer(
     near = rotor.shapes[:, journals]
     adjoint = rotor.shapes.conj().transpose(0, 2, 1)
     size = count + near.shape[2]
+    # All that w multiplies at once: what the journals do by g, by the modes and by the loads.
+    moves = np.concatenate([rotor.between(count // 2), -near, np.broadcast_to(
+        free[:, journals], (len(near), count, free.shape[2]))], axis=2)
+    forces = w @ moves
     system = np.zeros((len(standing.omega), size, size), dtype=complex)
-    system[:, :count, :count] = a + w @ rotor.between(count // 2)
-    system[:, :count, count:] = -w @ near
+    system[:, :count] = forces[..., :size]
+    system[:, :count, :count] += a
     system[:, count:, :count] = adjoint[:, :, journals]
     system[:, range(count, size), range(count, size)] = rotor.stiffness
-    right = np.concatenate([w @ free[:, journals] - bearings @ moved, adjoint @ loads], axis=1)
+    right = np.concatenate([forces[..., size:] - bearings @ moved, adjoint @ loads], axis=1)
     try:
         solution = np.linalg.solve(system, right)
     except np.linalg.LinAlgError as error:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+import math
 
 import numpy as np
 import scipy.linalg
@@ -10,7 +11,7 @@ import scipy.linalg
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.physics.bearing import Bearing
 from rotorsoil_ros.physics.errors import RotorSoilError
-from rotorsoil_ros.physics.foundation import carrying, Foundation
+from rotorsoil_ros.physics.foundation import BlockReceptance, carrying, Foundation
 from rotorsoil_ros.physics.soil import SoilModel
 
 
@@ -65,6 +66,12 @@ class Support:
         return rows
 
     @cached_property
+    def _seat_pairs(self) -> FloatArray:
+        """Products of the motion of two seats per unit motion of the blocks, (f, 6, 6, 4 b^2)."""
+        pairs = np.einsum('fpi,fqj->fijpq', self.seat_rows, self.seat_rows)
+        return np.asarray(pairs.reshape(*pairs.shape[:3], math.prod(pairs.shape[3:])))
+
+    @cached_property
     def pedestal_axes(self) -> list[int]:
         """Those of the housings' (x, z) that have a pedestal of their own below them."""
         return [2 * index + axis for index, bearing in enumerate(self.bearings)
@@ -89,16 +96,12 @@ class Support:
 
     def standing(self, omega: FloatArray) -> 'Standing':
         """Return how the support answers forces at frequencies (n,) [rad/s]."""
-        compliances = [model.compliance(omega) for model in self.soil_models]
-        inertias = [carrying(compliance, foundation.mass_matrix, omega) for compliance, foundation
-                    in zip(compliances, self.foundations, strict=True)]
-        per_force = [np.linalg.solve(held_back, compliance @ rows.T)
-                     for held_back, compliance, rows
-                     in zip(inertias, compliances, self.seat_rows, strict=True)]
+        blocks = [BlockReceptance.of(model.compliance(omega), foundation.mass_matrix, omega)
+                  for model, foundation in zip(self.soil_models, self.foundations, strict=True)]
         deflection = self.pedestals(omega)
-        for rows, motion in zip(self.seat_rows, per_force, strict=True):
-            deflection += rows @ motion
-        return Standing(self, omega, compliances, inertias, per_force, deflection)
+        for pairs, block in zip(self._seat_pairs, blocks, strict=True):
+            deflection += block.between(pairs).reshape(-1, *deflection.shape[1:])
+        return Standing(self, omega, blocks, deflection)
 
     @cached_property
     def motion_rows(self) -> FloatArray:
@@ -143,10 +146,8 @@ class Standing:
         What it is.
     omega : (n,) float array
         Excitation frequency [rad/s].
-    compliances, inertias : lists of (n, 6, 6) complex arrays
-        N of each block [m/N], and I - omega^2 N M, what its mass makes of it [-].
-    per_force : list of (n, 6, 2 b) complex arrays
-        Motion of each block per force on a seat.
+    block_receptances : list of BlockReceptance
+        Of each block on its soil.
     deflection : (n, 2 b, 2 b) complex array
         Motion of the housings per force into their pedestals [m/N].
 
@@ -154,9 +155,7 @@ class Standing:
 
     support: Support
     omega: FloatArray
-    compliances: list[ComplexArray]
-    inertias: list[ComplexArray]
-    per_force: list[ComplexArray]
+    block_receptances: list[BlockReceptance]
     deflection: ComplexArray
 
     @cached_property
@@ -194,9 +193,9 @@ class Standing:
         if not loads.any():  # the usual case, at no cost
             return (np.zeros((1, count, loads.shape[1]), dtype=complex),
                     np.zeros((1, len(loads) - count, loads.shape[1]), dtype=complex))
-        on_housings, on_blocks = loads[:count], loads[count:].reshape(-1, 6, loads.shape[1])
-        blocks = [np.linalg.solve(inertia, compliance @ load) for inertia, compliance, load
-                  in zip(self.inertias, self.compliances, on_blocks, strict=True)]
+        on_housings, on_blocks = loads[:count], loads[count:].reshape(-1, 1, 6, loads.shape[1])
+        blocks = [block.motion(load) for block, load
+                  in zip(self.block_receptances, on_blocks, strict=True)]
         seats = np.zeros((len(self.omega), count, loads.shape[1]), dtype=complex)
         for rows, motion in zip(self.support.seat_rows, blocks, strict=True):
             seats += rows @ motion
@@ -223,13 +222,17 @@ class Standing:
         """
         square = self.omega[:, None, None] ** 2
         count = through.shape[1]
-        seats = through + loads[:count] + square * (self.support.housing_mass @ housings)
+        seats = through + loads[:count]
+        if self.support.housing_mass.any():
+            seats = seats + square * (self.support.housing_mass @ housings)
         motions, forces = [through[:, :0]], [through[:, :0]]
-        for index, (rows, per_force, foundation) in enumerate(zip(
-                self.support.seat_rows, self.per_force, self.support.foundations, strict=True)):
+        for index, (rows, block, foundation) in enumerate(zip(
+                self.support.seat_rows, self.block_receptances, self.support.foundations,
+                strict=True)):
             own = slice(6 * index, 6 * index + 6)
-            motion = pushed[:, own] + per_force @ seats
+            at_seats = rows.T @ seats
+            motion = pushed[:, own] + block.motion(at_seats)
             motions.append(motion)
-            forces.append(rows.T @ seats + loads[count:][own]
+            forces.append(at_seats + loads[count:][own]
                           + square * (foundation.mass_matrix @ motion))
         return np.concatenate(motions, axis=1), np.concatenate(forces, axis=1)

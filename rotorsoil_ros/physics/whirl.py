@@ -110,7 +110,7 @@ class WhirlModes:
         gain = 1.0 / np.where(size < np.finfo(float).tiny, 1.0, stiffness)
         np.put_along_axis(gain, nearest, 0.0, axis=1)
         shapes = self.shapes[directions, :, indices]
-        powers = (argument / scale)[:, None] ** np.arange(_TERMS)
+        powers = np.vander(argument / scale, _TERMS, increasing=True)
         receptances = np.stack([
             powers @ self._series(direction, ~close[direction], scale)
             + gain[:, directions == direction] @ _squares(shapes[directions == direction])
@@ -124,8 +124,8 @@ class WhirlModes:
     def _series(self, direction: int, far: BoolArray, scale: float) -> FloatArray:
         """Return the receptance of far modes as a power series, (terms, p^2)."""
         ratio = scale * self.inverse[direction, far]
-        return np.asarray(
-            ratio ** np.arange(_TERMS)[:, None] @ _squares(self.shapes[direction][:, far].T))
+        powers = np.vander(ratio, _TERMS, increasing=True)
+        return np.asarray(powers.T @ _squares(self.shapes[direction][:, far].T))
 
 
 def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -178,15 +178,16 @@ class PortReceptance:
         """
         _, length, ports, _ = self.regular.shape
         count, columns = forces.shape[-2] // 2, forces.shape[-1]
-        x, z = forces[..., 0::2, :], forces[..., 1::2, :]
-        whirls = np.stack([orbit[0].conj() * x + orbit[1].conj() * z for orbit in ORBITS])
         # One set of forces for all frequencies, or one for each.
         sets = forces.shape[0] if forces.ndim == 3 else 1
-        answers = self.regular[..., :count] @ whirls.reshape(2, sets, count, columns)
-        motion = np.empty((length, ports, 2, columns), dtype=complex)
-        for axis in (0, 1):
-            motion[:, :, axis] = ORBITS[0, axis] * answers[0] + ORBITS[1, axis] * answers[1]
-        return motion.reshape(length, 2 * ports, columns)
+        turned = (forces.reshape(sets, count, 2, columns).swapaxes(1, 2).reshape(sets, 2, -1)
+                  .swapaxes(0, 1).reshape(2, -1))
+        whirls = (ORBITS.conj() @ turned).reshape(2, sets, count, columns)
+        # The receptance is real: as pairs of real numbers no complex copy of it is needed.
+        pairs = self.regular[..., :count] @ whirls.view(float)
+        answers = pairs.view(complex).reshape(2, -1)
+        motion = (ORBITS.T @ answers).reshape(2, length, ports, columns)
+        return np.asarray(np.moveaxis(motion, 0, 2).reshape(length, 2 * ports, columns))
 
     def between(self, count: int) -> ComplexArray:
         """Return the regular receptance between the first ports, (n, 2 q, 2 q)."""

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rotorsoil_ros.physics.errors import RotorSoilError
-from rotorsoil_ros.physics.foundation import add_mass, Foundation
+from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.physics.foundation import add_mass, BlockReceptance, Foundation
 from rotorsoil_ros.physics.soil import Rectangle, RigidSoil
 
 from machines import CONE, CONTACT
@@ -36,6 +36,54 @@ def test_receptance_is_the_inverse_of_stiffness_minus_inertia():
     got = add_mass(compliance, BLOCK.mass_matrix, omega)
     np.testing.assert_allclose(got @ stiffness, np.broadcast_to(np.eye(6), (3, 6, 6)),
                                atol=1e-12)  # round-off of a product of order one
+
+
+def of_soil(*pairs):
+    """Return a compliance at three frequencies that couples pairs of dofs, and frequencies."""
+    omega = np.array([10.0, 300.0, 900.0])
+    compliance = CONE.compliance(omega)
+    for i, j in pairs:
+        product = compliance[:, i, i] * compliance[:, j, j]
+        compliance[:, i, j] = compliance[:, j, i] = 0.3 * np.sqrt(product)
+    return compliance, omega
+
+
+@pytest.mark.parametrize('pairs, sizes', [
+    ([], {1: 2, 2: 2}),  # the centre of gravity couples x with ry and y with rx
+    ([(0, 4), (1, 3)], {1: 2, 2: 2}),
+    ([(0, 2)], {1: 1, 2: 1, 3: 1}),
+    ([(0, 2), (2, 3), (4, 5)], {6: 1})])
+def test_receptance_by_coupled_sets_is_that_of_the_whole_block(pairs, sizes):
+    compliance, omega = of_soil(*pairs)
+    mass = BLOCK.mass_matrix
+    held_back = np.eye(6) - omega[:, None, None] ** 2 * (compliance @ mass)
+    whole = np.linalg.solve(held_back, compliance)
+    found = BlockReceptance.of(compliance, mass, omega)
+    assert {sets.shape[1]: len(sets) for sets, _ in found.parts} == sizes
+    np.testing.assert_allclose(found.motion(np.eye(6)[None]), whole, rtol=1e-12, atol=1e-24)
+    rows = np.random.default_rng(0).standard_normal((4, 6))
+    pairs = np.einsum('pi,qj->ijpq', rows, rows).reshape(6, 6, 16)
+    np.testing.assert_allclose(found.between(pairs).reshape(-1, 4, 4), rows @ whole @ rows.T,
+                               rtol=1e-12)
+
+
+def test_dofs_that_are_held_take_no_part():
+    compliance, omega = of_soil()
+    compliance[:, :2] = compliance[:, :, :2] = 0.0
+    found = BlockReceptance.of(compliance, BLOCK.mass_matrix, omega)
+    assert sorted(dof for sets, _ in found.parts for dof in sets.ravel().tolist()) == [2, 3, 4, 5]
+    motion = found.motion(np.ones((1, 6, 1)))
+    assert not motion[:, :2].any()
+    np.testing.assert_allclose(
+        motion[:, 2, 0], 1.0 / (1.0 / compliance[:, 2, 2] - omega**2 * 400.0), rtol=1e-12)
+
+
+@pytest.mark.parametrize('size', [1, 2, 3])
+def test_resonance_without_damping_is_an_error_and_not_a_number(size):
+    # k = 4 N/m and m = 1 kg in one direction: resonance at 2 rad/s, to the last bit.
+    compliance = np.broadcast_to(0.25 * np.eye(size) + 0j, (2, size, size))
+    with pytest.raises(NotSolvedError, match='resonance without damping'):
+        add_mass(compliance, np.eye(size), np.array([1.0, 2.0]))
 
 
 def test_rigid_soil_holds_the_block():
