@@ -22,13 +22,13 @@ from mcap.writer import MCAP0_MAGIC
 import yaml
 import zstandard
 
+from rotorsoil_ros.live.events import LAST_STAMP
 from rotorsoil_ros.live.messages import Records
 from rotorsoil_ros.physics.errors import InputError
 
 RECORD_HEADER = struct.Struct('<BQ')
 MESSAGE_HEADER = struct.Struct('<HIQQ')
 LARGEST_RECORD = 1 << 28  # [bytes]; a file that claims more is broken or hostile
-LAST_STAMP = (1 << 63) - 1
 MOST_WAITING = 1 << 18  # messages of chunks that overlap; beyond, order gives way to memory
 LOOSE = 1000  # messages without a chunk are handed on in portions of so many
 BROKEN = (McapError, struct.error, zstandard.ZstdError, RuntimeError, UnicodeDecodeError,

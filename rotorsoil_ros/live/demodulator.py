@@ -7,6 +7,7 @@ import numpy as np
 
 from rotorsoil_ros.live.events import Demodulated, NANOSECONDS, Samples
 from rotorsoil_ros.live.history import History
+from rotorsoil_ros.live.imu import LARGEST
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.errors import NotSolvedError
 from rotorsoil_ros.physics.orders import demodulate, OrderVector
@@ -61,7 +62,7 @@ class Demodulator:
         """Return what has been kept, in order; too late or before every speed is left out."""
         stamps = np.concatenate([stamps for stamps, _ in self._parts])
         values = np.concatenate([values for _, values in self._parts])
-        chosen = (stamps >= begin_ns) & (stamps > self._done_ns) & np.isfinite(values)
+        chosen = (stamps >= begin_ns) & (stamps > self._done_ns) & (np.abs(values) <= LARGEST)
         self.left_out += len(stamps) - int(np.count_nonzero(chosen))
         stamps, values = stamps[chosen], values[chosen]
         order = np.argsort(stamps, kind='stable')

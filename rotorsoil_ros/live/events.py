@@ -11,6 +11,7 @@ from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.prediction import Prediction
 
 NANOSECONDS = 1_000_000_000
+LAST_STAMP = (1 << 31) * NANOSECONDS - 1  # seconds of a stamp are an int32: until 2038
 
 
 class Level(IntEnum):

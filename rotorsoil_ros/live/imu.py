@@ -20,6 +20,8 @@ AXES = ('x', 'y', 'z')
 # the covariance.
 _BEFORE_ACCELERATION = 4 + 9 + 3 + 9
 
+LARGEST = 1e9  # [m/s^2]; no sensor tells more, and its square still fits into a double
+
 _NOT_MEASURED = -1.0  # in the first covariance
 
 
@@ -88,5 +90,6 @@ def _decode(layout: _Layout, cdrs: Sequence[bytes]) -> Accelerations:
     rows = np.frombuffer(b''.join(cdrs), dtype=layout.dtype)
     acceleration = rows['acceleration'].astype(float)
     acceleration[rows['covariance'] == _NOT_MEASURED] = np.nan
+    acceleration[np.abs(acceleration) > LARGEST] = np.nan
     return Accelerations(rows['sec'].astype(np.int64) * NANOSECONDS + rows['nanosec'],
                          acceleration, layout.is_synthetic)

@@ -10,11 +10,11 @@ from typing import TypeAlias
 import numpy as np
 
 from rotorsoil_ros.live.cdr import BODY, JointLayout, JointStateReader, LITTLE_ENDIAN
-from rotorsoil_ros.live.events import Measured, Samples
+from rotorsoil_ros.live.events import LAST_STAMP, Measured, Samples
 from rotorsoil_ros.live.imu import AXES, IMU, ImuReader
 from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE, Records
 from rotorsoil_ros.live.monitor import Monitor
-from rotorsoil_ros.physics.arrays import FloatArray
+from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 
 SPEED_TOPICS = {'joint_states': JOINT_STATE, 'rotor/speed': FLOAT64}
 MEASURED_TOPICS = {'measured/amplitude': JOINT_STATE, 'measured/phase': JOINT_STATE}
@@ -87,7 +87,7 @@ class JointSpeed:
         if layout is None or self._fault == 'joint_missing':
             return 0, math.nan, math.nan, self._fault
         stamp = layout.stamp_ns(cdr)
-        if stamp < 0:
+        if not 0 <= stamp <= LAST_STAMP:
             return 0, math.nan, math.nan, 'malformed'
         angle = self._unpack(cdr, self._angle_at)[0] if self._angle_at else math.nan
         speed = math.nan if self._fault else self._unpack(cdr, self._at)[0]
@@ -153,7 +153,7 @@ class MeasuredInlet:
     def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
         """Take in messages; their own stamps count, not when they were received."""
         for messages, states in self._reader.runs(cdrs):
-            if states is None or states.stamp_ns.min() < 0:
+            if states is None or not are_stamps(states.stamp_ns):
                 self._monitor.health.note('malformed', len(messages))
                 continue
             self._log(Records(self._topic, JOINT_STATE, states.stamp_ns.tolist(), messages))
@@ -175,13 +175,18 @@ class SampleInlet:
     def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
         """Take in messages; their own stamps count, not when they were received."""
         for messages, samples in self._reader.runs(cdrs):
-            if samples is None or samples.stamp_ns.min() < 0:
+            if samples is None or not are_stamps(samples.stamp_ns):
                 self._monitor.health.note('malformed', len(messages))
                 continue
             self._log(Records(self._topic, IMU, samples.stamp_ns.tolist(), messages))
             self._monitor.on_samples(Samples(
                 self._monitor.machine, self._channel, samples.stamp_ns,
                 samples.acceleration[:, self._axis]))
+
+
+def are_stamps(stamp_ns: IntArray) -> bool:
+    """Return whether all of these, (n,), can be stamps [ns]."""
+    return bool(stamp_ns.min() >= 0 and stamp_ns.max() <= LAST_STAMP)
 
 
 def raw_channel(name: str) -> str:

@@ -15,7 +15,7 @@ from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.cdr import Cursor, JointStateReader, JointStates
 from rotorsoil_ros.live.events import NANOSECONDS
 from rotorsoil_ros.live.imu import AXES, IMU, ImuReader
-from rotorsoil_ros.live.inlets import ROTOR_JOINT, SPEED_TOPICS, SpeedReader
+from rotorsoil_ros.live.inlets import are_stamps, ROTOR_JOINT, SPEED_TOPICS, SpeedReader
 from rotorsoil_ros.live.messages import FLOAT64, JOINT_STATE, Records, STRING
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.comparison import nearest, Signal
@@ -130,7 +130,7 @@ def _take(contents: _Contents, batch: Records, kind: str, reader: JointStateRead
     """Decode a batch of one topic."""
     if batch.type == JOINT_STATE:
         for messages, states in reader.runs(batch.payloads):
-            if states is None or states.stamp_ns.min() < 0:
+            if states is None or not are_stamps(states.stamp_ns):
                 contents.malformed += len(messages)
             else:
                 contents.states[kind].append(states)
@@ -161,7 +161,7 @@ def _accelerations(
 ) -> Iterator[tuple[IntArray, FloatArray]]:
     """Yield stamps [ns] and accelerations (n, 3) [m/s^2]."""
     for messages, samples in ImuReader().runs(cdrs):
-        if samples is None:
+        if samples is None or not are_stamps(samples.stamp_ns):
             contents.malformed += len(messages)
             continue
         contents.is_synthetic |= samples.is_synthetic

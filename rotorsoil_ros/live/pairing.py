@@ -13,6 +13,7 @@ from rotorsoil_ros.live.history import History
 from rotorsoil_ros.physics.arrays import FloatArray
 
 MOST = 1024  # vectors that wait; what waits longer is given up
+LARGEST = 1e3  # [m, rad]; no machine moves further
 PATIENCE = 2  # ticks after which an amplitude goes without its phase
 
 Names: TypeAlias = tuple[str, ...]
@@ -70,7 +71,8 @@ class Vectors:
             amplitude = np.where(other, self.swing / self.speed, amplitude)
             if self.swing_phase is not None:
                 phase = np.where(other, self.swing_phase - 0.5 * np.pi, phase)
-        return amplitude, phase
+        possible = (amplitude >= 0.0) & (amplitude <= LARGEST)
+        return np.where(possible, amplitude, np.nan), np.where(np.isfinite(phase), phase, np.nan)
 
 
 class Pairing:

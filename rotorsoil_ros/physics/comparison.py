@@ -29,7 +29,7 @@ class Reason(StrEnum):
     """Why a measured point is not held against its prediction."""
 
     USED = ''
-    NOT_FINITE = 'measured value is not finite'
+    NOT_FINITE = 'measured value is negative or not finite'
     NO_SPEED = 'no speed reported near its stamp'
     OUT_OF_TABLE = 'outside the speed range of the prediction'
     NO_PREDICTION = 'channel or speed has no prediction'
@@ -244,6 +244,7 @@ def _channel(
                        reference.ahead))
     speed = matched(reference.speed)
     amplitude, phase = signal.amplitude, signal.phase
+    amplitude = np.where((amplitude >= 0.0) & np.isfinite(amplitude), amplitude, np.nan)
     rolling = (np.abs(speed - matching.slow_roll_speed)
                <= SLOW_ROLL_WINDOW * matching.slow_roll_speed)
     rolling &= np.isfinite(amplitude * phase)

@@ -1,25 +1,30 @@
 """Whatever bytes come in, none of them raises, hangs, fills the memory or changes a number."""
 
 from contextlib import suppress
+from dataclasses import replace
 import io
 import math
 import struct
 
+from geometry_msgs.msg import Vector3
 from hypothesis import given, HealthCheck, settings, strategies as some
 from mcap.data_stream import RecordBuilder
 from mcap.records import Chunk, Header
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 import zstandard
 
+from rotorsoil_ros.case.criteria import criteria
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.cdr import JointStateReader
-from rotorsoil_ros.live.events import Predicted
+from rotorsoil_ros.live.events import LAST_STAMP, Measured, Predicted, Samples
 from rotorsoil_ros.live.inlets import inlet, TOPICS
+from rotorsoil_ros.live.messages import Encoder, Topics
 from rotorsoil_ros.live.monitor import Monitor
 from rotorsoil_ros.live.recover import recover
+from rotorsoil_ros.physics.band import SoilSpread
 from rotorsoil_ros.physics.errors import InputError
 
 MANY = settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -32,13 +37,24 @@ def message():
         name=['gear', 'rotor'], position=[0.0, 1.0], velocity=[5.0, 300.0], effort=[0.0, 2.0]))
 
 
+def sample():
+    return serialize_message(Imu(linear_acceleration=Vector3(x=1.0, y=2.0, z=9.81)))
+
+
 @pytest.fixture(scope='module')
 def inlets(machine):
     """Return inlets of a machine for every topic, and what comes out of them."""
     events = []
     monitor = Monitor('m', machine.table, machine.case.unbalance, sinks=[events.append])
     return [inlet(name, f'/m/{name}', monitor, rotor_joint='rotor', log=events.append)
-            for name in TOPICS], events
+            for name in (*TOPICS, 'measured/disc_1_x/imu')], events
+
+
+@pytest.fixture(scope='module')
+def basis(machine, cache):
+    case = replace(machine.case, uncertainty=SoilSpread(samples=3))
+    found = criteria(case, machine.model, case.unbalance, cache)
+    return lambda: found  # whose repr is short: hypothesis prints it
 
 
 def is_sane(events, machine):
@@ -48,7 +64,7 @@ def is_sane(events, machine):
             speed = event.prediction.speed
             answered = np.isfinite(event.prediction.displacement).all(axis=1)
             assert answered.tolist() == ((speed >= low) & (speed <= high)).tolist()
-            assert (event.stamp_ns >= 0).all()
+            assert ((event.stamp_ns >= 0) & (event.stamp_ns <= LAST_STAMP)).all()
     events.clear()
 
 
@@ -70,6 +86,54 @@ def test_a_message_with_a_few_bytes_changed_is_answered_or_counted(
     content[at:at + 4] = struct.pack('<I', value)
     for take in taken_in:
         take((0,), (bytes(content[:len(content) - cut] if cut < 50 else content),))
+    is_sane(events, machine)
+
+
+@MANY
+@given(at=some.integers(0, 320), value=some.integers(0, 2**32 - 1), cut=some.integers(0, 400))
+def test_a_sample_with_a_few_bytes_changed_is_taken_or_counted(inlets, machine, at, value, cut):
+    taken_in, events = inlets
+    content = bytearray(sample())
+    content[at:at + 4] = struct.pack('<I', value)
+    for take in taken_in:
+        take((0,), (bytes(content[:len(content) - cut] if cut < 330 else content),))
+    is_sane(events, machine)
+
+
+STAMPS = some.one_of(some.integers(0, LAST_STAMP), some.integers(0, 3 * 10**9))
+NUMBERS = some.one_of(some.floats(), some.floats(-1e-3, 1e-3), some.floats(0.0, 1000.0))
+CHANNELS = some.sampled_from(['disc_1_x', 'bearing_1_housing_z', 'block_rx', 'nobody', ''])
+STEPS = some.lists(max_size=30, elements=some.one_of(
+    some.tuples(some.just('speed'), STAMPS, NUMBERS, NUMBERS),
+    some.tuples(some.sampled_from(['amplitude', 'phase']), STAMPS, CHANNELS, NUMBERS, NUMBERS),
+    some.tuples(some.just('samples'), STAMPS, some.integers(1, 300), NUMBERS),
+    some.tuples(some.just('tick'), STAMPS)))
+
+
+@MANY
+@given(steps=STEPS)
+def test_whatever_is_measured_in_whatever_order_is_judged_without_a_traceback(
+        machine, basis, steps):
+    events = []
+    monitor = Monitor('m', machine.table, machine.case.unbalance, sinks=[events.append])
+    monitor.judge.take_criteria(basis())
+    encoder = Encoder(machine.table.channels, Topics.of('', 'm'))
+    for kind, stamp, *rest in steps:
+        at = np.array([stamp])
+        if kind == 'speed':
+            monitor.on_speed(at, np.array(rest[:1]), np.array(rest[1:]))
+        elif kind == 'samples':
+            count, value = rest
+            stamps = np.minimum(stamp + 10**6 * np.arange(count), LAST_STAMP)
+            monitor.on_samples(Samples('m', 'disc_1_x', stamps, np.full(count, value)))
+        elif kind == 'tick':
+            monitor.tick(stamp, stale_after_s=3.0)
+        else:
+            channel, *values = rest
+            one, other = (np.array([[value]]) for value in values)
+            monitor.on_measured(Measured('m', kind, at, (channel,), one, other))
+    monitor.tick(LAST_STAMP, stale_after_s=3.0)
+    assert sum(len(list(encoder.encode(event))) for event in events)
     is_sane(events, machine)
 
 
