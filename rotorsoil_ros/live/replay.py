@@ -26,6 +26,7 @@ TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
 DEPTH = 1000
 NAP_S = 0.05  # how soon an interrupt or a new subscriber is noticed
 DELIVERY_S = 5.0
+SENSORS_S = 2.5
 
 Progress = Callable[[int, int], None]
 
@@ -94,7 +95,7 @@ class _Player:
         self._speeds = [topic for topic, kind in found.items() if tells_speed(topic, kind)]
 
     def wait_for_listeners(self, wait_s: float) -> None:
-        """Wait until somebody hears every speed topic."""
+        """Wait until somebody hears every speed topic, and a little for the others."""
         until = time.monotonic() + wait_s
         while deaf := [topic for topic in self._speeds
                        if not self._publishers[topic].get_subscription_count()]:
@@ -102,6 +103,11 @@ class _Player:
                 return
             if time.monotonic() > until:
                 raise RotorSoilError(f'nobody listens to {", ".join(deaf)} after {wait_s:g} s')
+            time.sleep(NAP_S)
+        # A node hears sensors a second after they have begun to publish.
+        until = time.monotonic() + SENSORS_S
+        while time.monotonic() < until and self._context.ok() and not all(
+                publisher.get_subscription_count() for publisher in self._publishers.values()):
             time.sleep(NAP_S)
 
     def play(self, profile: Path, rate: float, progress: Callable[[int], Any]) -> int:

@@ -1,5 +1,6 @@
 """A replayed log gives the numbers of the log again: live and offline are one."""
 
+from pathlib import Path
 from threading import Thread
 import time
 
@@ -13,13 +14,16 @@ from std_msgs.msg import Float64
 
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.bag_writer import LogFile
+from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import JOINT_STATE, JointStateWriter, Records
 from rotorsoil_ros.live.node import RotorsoilNode
 from rotorsoil_ros.live.predict import predict
 from rotorsoil_ros.live.profile import write_speed_profile
 from rotorsoil_ros.live.replay import replay
+from rotorsoil_ros.live.synthetic import Truth, write_synthetic
 from rotorsoil_ros.physics.errors import InputError, RotorSoilError
 
+FAN = Path('config/plant_fan.yaml')
 START = 1_700_000_000_000_000_001
 ANSWERS = ('/rotorsoil/fan/amplitude', '/rotorsoil/fan/phase')
 MEASURED = '/fan/measured/amplitude'
@@ -155,3 +159,23 @@ def test_a_bag_without_speed_is_refused(tmp_path):
             ['a']).write([START], np.zeros((1, 3, 1)))))
     with pytest.raises(InputError, match='tells no speed'):
         replay(tmp_path / 'p.mcap')
+
+
+def test_sensors_are_heard_from_their_first_sample_on(graph, tmp_path, cache):
+    fan = Machine.load(FAN, cache_directory=cache)
+    source = tmp_path / 'run.mcap'
+    truth = Truth(ramp_s=2.0, dwell_s=1.0, slowest_rpm=900.0, rate_hz=400.0)
+    write_synthetic(source, 'fan', fan.model, fan.case.unbalance, truth=truth, start_ns=START)
+    parameters = {'cache': str(cache), 'machines': ['fan'], 'fan.case': str(FAN),
+                  'speed_reliability': 'reliable', 'speed_depth': 1000, 'log.rerun': False,
+                  'log.directory': str(tmp_path)}
+    node = graph.add(RotorsoilNode(
+        context=graph.context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in parameters.items()]))
+    assert node.start()
+    replaying = InThread(replay, source, rate=4.0, context=graph.context)
+    counts = node._watches[0].monitor.health.counts
+    graph.until(lambda: replaying.is_done() and counts['samples'] == 8000, 'every sample')
+    node.release()
+    wanted, found = bag_reader.topics(source), bag_reader.topics(tmp_path / 'run')
+    assert {topic: found[topic] for topic in wanted} == wanted
