@@ -130,7 +130,9 @@ def test_margins_of_a_running_speed_come_on_request(capsys):
     assert header[3:] == ['amplification_factor', 'separation_margin', 'required_margin']
     np.testing.assert_allclose(rows[:, 3], 0.5 / rows[:, 2])
     np.testing.assert_allclose(rows[:, 4], np.abs(rows[:, 0] / (100.0 * np.pi) - 1.0))
-    required = 0.17 * (1.0 - 1.0 / (rows[:, 3] - 1.5)) + 0.1 * (rows[:, 0] > 100.0 * np.pi)
+    # min(17 (1 - 1 / (AF - 1.5)), 16) below, min(10 + 17 (1 - 1 / (AF - 1.5)), 26) above
+    share = np.minimum(0.17 * (1.0 - 1.0 / (rows[:, 3] - 1.5)), 0.16)
+    required = share + 0.1 * (rows[:, 0] > 100.0 * np.pi)
     np.testing.assert_allclose(rows[:, 5], np.where(rows[:, 3] < 2.5, 0.0, required))
 
 

@@ -25,7 +25,8 @@ def permissible_unbalance(*, grade: float, mass: float, speed: float) -> float:
 
     References
     ----------
-    ISO 21940-11:2016, sec. 6, eq. (6): e_per Omega = G.
+    ISO 21940-11:2016 (before: ISO 1940-1): a grade G is the permissible eccentricity times the
+    highest service speed, e_per Omega in mm/s, and U_per = e_per m.
 
     """
     require(0.0 < grade < math.inf, 'grade', '> 0 m/s and finite', grade)

@@ -121,7 +121,8 @@ class BlockReceptance:
         """Add a mass to a compliance; parameters as in `add_mass`."""
         moving: BoolArray = np.any(compliance != 0.0, axis=0)
         # What cannot move couples nothing, whatever its mass.
-        pattern = moving | ((mass != 0.0) & moving.any(axis=0) & moving.any(axis=1)[:, None])
+        free = np.any(moving, axis=0)
+        pattern = moving | ((mass != 0.0) & np.outer(free, free))
         parts = []
         for sets in _coupled(pattern.tobytes(), len(mass)):
             rows, columns = sets[:, :, None], sets[:, None]

@@ -160,14 +160,17 @@ class CriticalSpeed:
 
         References
         ----------
-        API 617, 7th ed. (2002), part 1, sec. 2.6.2.10: none below an amplification factor of
-        2.5; 17 (1 - 1 / (AF - 1.5)) percent, and 10 percent more for a critical speed above.
+        The rule of API 617 (7th ed.), as API RP 684 (2nd ed.), SP6.8.2.10, explains it: none
+        below an amplification factor AF of 2.5; for a critical speed below the running speed
+        17 (1 - 1 / (AF - 1.5)) or 16 percent, for one above 10 + 17 (1 - 1 / (AF - 1.5)) or 26
+        percent, whichever is less.
 
         """
         factor = self.amplification_factor
         if factor < 2.5:
             return 0.0
-        return 0.17 * (1.0 - 1.0 / (factor - 1.5)) + (0.10 if self.speed > running else 0.0)
+        margin = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), 0.16)
+        return margin + (0.10 if self.speed > running else 0.0)
 
 
 @_solvable()

@@ -608,6 +608,10 @@ def test_margins_are_those_of_the_standard():
     assert damped.required_margin(250.0) == 0.0
     assert sharp.required_margin(400.0) == pytest.approx(0.17 * 0.9)
     assert sharp.required_margin(250.0) == pytest.approx(0.17 * 0.9 + 0.10)
+    # From AF = 18.5 on the margins stay at 16 and 26 percent.
+    sharpest = type(critical)(300.0, 1, 1e-4, critical.deflection, critical.support)
+    assert sharpest.required_margin(400.0) == 0.16
+    assert sharpest.required_margin(250.0) == pytest.approx(0.26)
 
 
 @pytest.mark.parametrize('call, rule', [
