@@ -27,6 +27,17 @@ def test_every_benchmark_of_the_shared_file_is_on_the_page(study):
     assert names <= set(re.findall(r'^### (\S+)$', page, flags=re.MULTILINE))
 
 
+def test_every_response_that_ross_computed_is_on_the_page(study):
+    files = sorted(path.name for path in study.REFERENCE.glob('ross_*.csv'))
+    if not files:
+        pytest.skip('reference data not beside the checkout: ross_*.csv')
+    page = (DOCS / 'verification.md').read_text()
+    rows = dict(re.findall(r'^\| (ross_\S+\.csv) \| \d+ \| \S+ \| (.*) \|$', page,
+                           flags=re.MULTILINE))
+    assert sorted(rows) == files
+    assert set(rows.values()) == {'1e-06 | holds'}
+
+
 def test_page_shows_no_failure_and_nothing_absent():
     page = (DOCS / 'verification.md').read_text()
     assert 'FAILS' not in page
