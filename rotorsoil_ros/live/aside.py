@@ -39,11 +39,6 @@ class Aside(Generic[Item]):
         if not self.has_failed:
             self._items.append(item)
 
-    @property
-    def is_idle(self) -> bool:
-        """Whether no batch waits."""
-        return self._batches.empty()
-
     def flush(self) -> None:
         """Hand over what was collected, or drop it if the thread is far behind."""
         items, self._items = self._items, []

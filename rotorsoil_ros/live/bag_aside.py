@@ -3,14 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 from rotorsoil_ros.live.aside import Aside
 from rotorsoil_ros.live.events import Diagnostics, Level
 from rotorsoil_ros.live.messages import Records
 from rotorsoil_ros.live.recorder import Recorder
 
-BATCH = 4096  # records that are handed over before the second is over
-BACKLOG = 32  # batches that wait for a disk that hangs: 100 MB, or half a minute at low rates
+BATCH = 64  # records: more would keep the thread, and so the interpreter, busy for too long
+BACKLOG = 2048  # batches that wait for a disk that hangs: 100 MB, or half an hour at 10 Hz
 PATIENCE_S = 5.0  # at the end
 BEHIND = 'the disk did not keep up'
 
@@ -23,6 +24,9 @@ class Missed:
     until_ns: int
 
 
+Item: TypeAlias = Records | Missed | None  # None: it is time to put everything onto the disk
+
+
 class BagAside:
     """
     Hands what is to be logged to a recorder on a thread of its own.
@@ -33,7 +37,7 @@ class BagAside:
 
     def __init__(self, recorder: Recorder, *, complain: Callable[[str], object]) -> None:
         self._recorder = recorder
-        self._waiting: list[Records | Missed] = []
+        self._waiting: list[Item] = []
         self._missed: Missed | None = None
         self._said = recorder.report(0)
         self._aside = Aside(self._take, recorder.close, complain=complain, name='the log',
@@ -48,18 +52,12 @@ class BagAside:
         """Log messages of one topic."""
         self._waiting.append(records)
         if len(self._waiting) >= BATCH:
-            self.flush()
+            self._hand_over()
 
     def flush(self, *, wait_s: float = 0.0) -> None:
-        """Hand over what has come, which goes onto the disk; call it every second."""
-        waiting, self._waiting = self._waiting, []
-        if self._missed is not None:
-            waiting.insert(0, self._missed)
-        # An empty batch lets the recorder try again what has failed.
-        if (waiting or self._aside.is_idle) and not self._aside.put(waiting, wait_s=wait_s):
-            self._drop(waiting)
-        else:
-            self._missed = None
+        """Have everything put onto the disk, or tried again; call it every second."""
+        self._waiting.append(None)
+        self._hand_over(wait_s)
 
     def close(self) -> None:
         """Finish the bag, if the disk lets it."""
@@ -76,25 +74,36 @@ class BagAside:
                 f'not logging: {BEHIND}, {self._missed.count} messages so far'))
         return said
 
-    def _drop(self, batch: list[Records | Missed]) -> None:
+    def _hand_over(self, wait_s: float = 0.0) -> None:
+        batch, self._waiting = self._waiting, []
+        if self._missed is not None:
+            batch.insert(0, self._missed)
+        if self._aside.put(batch, wait_s=wait_s):
+            self._missed = None
+        else:
+            self._drop(batch)
+
+    def _drop(self, batch: list[Item]) -> None:
         """Count what there is no room for, and keep what is latched for the next time."""
         count, until_ns, latched = 0, 0, dict[str, Records]()
         for item in batch:
             if isinstance(item, Missed):
                 count, until_ns = item.count, item.until_ns
-            elif item.latched:
+            elif item is not None and item.latched:
                 latched[item.topic] = item
-            else:
+            elif item is not None:
                 count += len(item.payloads)
                 until_ns = item.log_time_ns[-1]
         self._missed = Missed(count, until_ns) if count else None
         self._waiting = list(latched.values())
 
-    def _take(self, batch: list[Records | Missed]) -> None:
+    def _take(self, batch: list[Item]) -> None:
+        recorder = self._recorder
         for item in batch:
-            if isinstance(item, Missed):
-                self._recorder.interrupt(item.count, item.until_ns, BEHIND)
+            if item is None:
+                recorder.flush()
+                self._said = recorder.report(0)
+            elif isinstance(item, Missed):
+                recorder.interrupt(item.count, item.until_ns, BEHIND)
             else:
-                self._recorder.write(item)
-        self._recorder.flush()
-        self._said = self._recorder.report(0)
+                recorder.write(item)

@@ -145,10 +145,16 @@ class McapWriter:
     ) -> None:
         """Append messages of one channel."""
         waiting, count = self._waiting, len(payloads)
-        waiting.channels += [channel] * count
-        waiting.stamp_ns += log_time_ns
-        waiting.payloads += payloads
-        waiting.size += sum(map(len, payloads)) + count * HEADER_SIZE
+        if count == 1:  # the live node, where this counts
+            waiting.channels.append(channel)
+            waiting.stamp_ns.append(log_time_ns[0])
+            waiting.payloads.append(payloads[0])
+            waiting.size += len(payloads[0]) + HEADER_SIZE
+        else:
+            waiting.channels += [channel] * count
+            waiting.stamp_ns += log_time_ns
+            waiting.payloads += payloads
+            waiting.size += sum(map(len, payloads)) + count * HEADER_SIZE
         if waiting.size > CHUNK_SIZE:
             self._end_chunk()
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from rotorsoil_ros.live import bag_reader
-from rotorsoil_ros.live.bag_aside import BACKLOG, BagAside, BATCH
+from rotorsoil_ros.live.bag_aside import BagAside, BATCH
 from rotorsoil_ros.live.bag_writer import new_directory
 from rotorsoil_ros.live.events import Level
 from rotorsoil_ros.live.recorder import Recorder
@@ -17,6 +17,7 @@ from rotorsoil_ros.live.recorder import Recorder
 from test_bag import joint_records, read_all, START, string_records
 
 DEADLINE_S = 10.0
+BACKLOG = 32
 SECOND = 10**9
 
 
@@ -52,11 +53,13 @@ class Desk:
         deadline = time.monotonic() + DEADLINE_S
         while not holds():
             assert time.monotonic() < deadline
-            self.aside.flush()
+            if self.aside._aside._batches.empty():
+                self.aside.flush()
 
 
 @pytest.fixture
-def desk(tmp_path):
+def desk(tmp_path, monkeypatch):
+    monkeypatch.setattr('rotorsoil_ros.live.bag_aside.BACKLOG', BACKLOG)
     desk = Desk(tmp_path)
     yield desk
     desk.goes.set()
@@ -65,7 +68,7 @@ def desk(tmp_path):
 
 def test_all_that_came_is_logged_in_its_order_when_the_run_ends(desk, tmp_path):
     sent = [joint_records(1, start=START + step * 10**6, topic=f'/{step % 3}')
-            for step in range(2 * BATCH + 10)]
+            for step in range(9 * BATCH + 10)]
     for records in sent:
         desk.aside.write(records)
     desk.aside.close()
