@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 
 from rotorsoil_ros.live.events import NANOSECONDS
+from rotorsoil_ros.live.recording import Recording
 from rotorsoil_ros.live.scene import Block, Scene
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.units import rad_s_to_rpm
@@ -23,18 +24,19 @@ class Picture:
     """Draws one machine into a recording, at most ten times per second of message time."""
 
     def __init__(
-        self, stream: rr.RecordingStream, entity: str, caption: str, scene: Scene,
+        self, recording: Recording, entity: str, caption: str, scene: Scene,
     ) -> None:
-        self._stream = stream
+        self._recording = recording
         self._entity = entity
         self._caption = caption
         self._scene = scene
         self._scale = 1.0
+        self._reservation = '; the height of the block is schematic' if any(
+            block.is_schematic for block in scene.blocks) else ''
         self._draw_at_rest()
 
     def draw(
-        self, stamp_ns: IntArray, speed: FloatArray, displacement: ComplexArray, *,
-        times: rr.TimeColumn,
+        self, stamp_ns: IntArray, speed: FloatArray, displacement: ComplexArray,
     ) -> None:
         """Draw frames (n,): speeds [rad/s] and displacements (n, channels) [m, rad]."""
         scene, known = self._scene, ~np.isnan(displacement[:, 0].real)
@@ -44,14 +46,14 @@ class Picture:
         turn = 2.0 * np.pi * (stamp_ns % TURN_NS) / TURN_NS
         offsets = scene.stations_at(displacement, turn) * scale[:, None, None]
         y = np.array([station.y for station in scene.stations])
-        self._send_strips('shaft', times, scene.shaft(offsets)[:, None], known)
-        self._send_strips('orbits', times, scene.orbits(displacement, scale), known)
-        self._send_strips('discs', times, scene.discs(offsets), known)
-        self._send_points(times, scene.points(y, offsets), known)
+        self._send_strips('shaft', stamp_ns, scene.shaft(offsets)[:, None], known)
+        self._send_strips('orbits', stamp_ns, scene.orbits(displacement, scale), known)
+        self._send_strips('discs', stamp_ns, scene.discs(offsets), known)
+        self._send_points(stamp_ns, scene.points(y, offsets), known)
         for block in scene.blocks:
             moved = np.real(displacement[:, list(block.channels)] * np.exp(1j * turn)[:, None])
-            self._move(block, times, np.where(known[:, None], moved, 0.0) * scale[:, None])
-        self._stream.send_columns(self._caption, [times], rr.TextDocument.columns(
+            self._move(block, stamp_ns, np.where(known[:, None], moved, 0.0) * scale[:, None])
+        self._recording.send(self._caption, stamp_ns, rr.TextDocument.columns(
             text=[self._words(*frame) for frame in zip(known, speed, largest, scale, strict=True)],
             media_type=['text/markdown'] * len(known)))
 
@@ -60,33 +62,33 @@ class Picture:
             return (f'**No prediction at {rad_s_to_rpm(speed):.0f} rpm**: '
                     'the foundation is drawn at rest, the shaft is not drawn.')
         return (f'**Displacements x {scale:g}** at {rad_s_to_rpm(speed):.0f} rpm; the largest is '
-                f'{1e6 * largest:.3g} um. One turn is drawn in {TURN_NS / NANOSECONDS:g} s; '
-                'height and shape of the block are schematic.')
+                f'{1e6 * largest:.3g} um. One turn is drawn in {TURN_NS / NANOSECONDS:g} s'
+                f'{self._reservation}.')
 
     def _send_strips(
-        self, name: str, times: rr.TimeColumn, strips: FloatArray, known: BoolArray,
+        self, name: str, stamp_ns: IntArray, strips: FloatArray, known: BoolArray,
     ) -> None:
         """Send one set of lines per frame, none where nothing is known."""
         if not strips.shape[1]:
             return
         sent = strips[known].reshape(-1, *strips.shape[2:])
-        self._stream.send_columns(f'{self._entity}/{name}', [times], rr.LineStrips3D.columns(
+        self._recording.send(f'{self._entity}/{name}', stamp_ns, rr.LineStrips3D.columns(
             strips=list(sent)).partition(np.where(known, strips.shape[1], 0)))
 
     def _send_points(
-        self, times: rr.TimeColumn, points: FloatArray, known: BoolArray,
+        self, stamp_ns: IntArray, points: FloatArray, known: BoolArray,
     ) -> None:
-        self._stream.send_columns(f'{self._entity}/stations', [times], rr.Points3D.columns(
+        self._recording.send(f'{self._entity}/stations', stamp_ns, rr.Points3D.columns(
             positions=points[known].reshape(-1, 3)).partition(
                 np.where(known, points.shape[1], 0)))
 
-    def _move(self, block: Block, times: rr.TimeColumn, moved: FloatArray) -> None:
+    def _move(self, block: Block, stamp_ns: IntArray, moved: FloatArray) -> None:
         """Shift and turn a block, with all that stands on it, by (n, 6) [m, rad]."""
         angle = np.linalg.norm(moved[:, 3:], axis=1)
         half = np.where(angle > 0.0, np.sin(0.5 * angle) / np.where(angle > 0.0, angle, 1.0), 0.5)
         quaternion = np.column_stack([moved[:, 3:] * half[:, None], np.cos(0.5 * angle)])
         moving = f'{self._entity}/{block.name}/{MOVING}'
-        self._stream.send_columns(moving, [times], rr.Transform3D.columns(
+        self._recording.send(moving, stamp_ns, rr.Transform3D.columns(
             translation=moved[:, :3], quaternion=quaternion))
 
     def _draw_at_rest(self) -> None:
@@ -96,9 +98,12 @@ class Picture:
         log('shaft', rr.LineStrips3D.from_fields(colors=STEEL, radii=SHAFT_RADIUS))
         log('orbits', rr.LineStrips3D.from_fields(colors=GOLD, radii=ORBIT_RADIUS))
         log('discs', rr.LineStrips3D.from_fields(colors=STEEL, radii=SHAFT_RADIUS))
-        log('stations', rr.Points3D.from_fields(
-            colors=GOLD, radii=rr.Radius.ui_points(5.0),
-            labels=[station.name for station in scene.stations]))
+        log('stations', rr.Points3D.from_fields(colors=GOLD, radii=rr.Radius.ui_points(5.0)))
+        # Beside the machine and not on it: names of neighbours would cover each other.
+        log('names', rr.Points3D(
+            [scene.name_place(station) for station in scene.stations], colors=GOLD, radii=0.0,
+            labels=[station.name.removesuffix('_journal') for station in scene.stations],
+            show_labels=True))
         axis = scene.points(scene.y[[0, -1]], np.zeros((2, 2)))
         log('shaft_at_rest', rr.LineStrips3D([axis], colors=(*STEEL, 90), radii=EDGE_RADIUS))
         log('pedestals', self._pedestals(scene.ground_seats, foot=0.0))
@@ -123,4 +128,4 @@ class Picture:
 
     def _log(self, name: str, what: rr.AsComponents) -> None:
         path = f'{self._entity}/{name}' if name else self._entity
-        self._stream.log(path, what, static=True)
+        self._recording.still(path, what)

@@ -17,7 +17,7 @@ SHAFT_POINTS = 61
 ORBIT_POINTS = 33
 LARGEST_SHARE = 0.15  # of the shaft length, that the largest drawn displacement may take
 SMALLEST_SHARE = 0.05  # below it the scale is chosen anew
-BLOCK_SHARE = 0.45  # of the shaft height, that a drawn block takes: its real height is not known
+BLOCK_SHARE = 0.45  # of the shaft height, that a block takes whose height is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,11 @@ class Station:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A drawn foundation: half-sizes, height, centre and bearing seats [m], its six channels."""
+    """
+    A drawn foundation: half-sizes, height, centre and bearing seats [m], its six channels.
+
+    It is schematic where its case does not tell its height.
+    """
 
     name: str
     half_width: float
@@ -54,6 +58,7 @@ class Block:
     centre_y: float
     seats: tuple[float, ...]
     channels: tuple[int, ...]
+    is_schematic: bool
 
 
 class Scene:
@@ -87,6 +92,12 @@ class Scene:
         """How large the whole is [m]."""
         blocks = [2.0 * max(block.half_width, block.half_length) for block in self.blocks]
         return max(self.length, self.shaft_height, *blocks)
+
+    def name_place(self, station: Station) -> tuple[float, float, float]:
+        """Return where the name of a station stands: a disc's above it, others at the foot."""
+        if station.radius > 0.0:
+            return 0.0, station.y, self.shaft_height + 1.2 * station.radius
+        return 0.0, station.y, 0.6 * self.shaft_height
 
     def stations_at(self, displacement: ComplexArray, turn: FloatArray) -> FloatArray:
         """Return where the stations are at angles of turn (n,): offsets (n, stations, 2)."""
@@ -166,8 +177,9 @@ def _block(foundation: Foundation, case: Case, index: Mapping[str, int]) -> Bloc
     seats = tuple(bearing.position for bearing in case.rotor.bearings
                   if bearing.foundation == foundation.name)
     channels = tuple(index[f'{foundation.name}_{dof}'] for dof in DOFS)
-    return Block(foundation.name, width, length, BLOCK_SHARE * case.rotor.shaft_height,
-                 foundation.centre_y, seats, channels)
+    height = foundation.height or BLOCK_SHARE * case.rotor.shaft_height
+    return Block(foundation.name, width, length, height,
+                 foundation.centre_y, seats, channels, foundation.height is None)
 
 
 def _bending(stations: Sequence[float], y: FloatArray) -> FloatArray:

@@ -1,6 +1,5 @@
 """What would sensors say of a machine whose soil and unbalance are known? Labelled synthetic."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,7 +20,8 @@ from rotorsoil_ros.physics.time_domain import shake, Shaking
 from rotorsoil_ros.physics.units import rpm_to_rad_s
 
 GRAVITY = 9.81
-BATCH = 4096
+SPEED_RATE_HZ = 50.0
+SLICE_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +94,17 @@ def write_synthetic(
                    phase=np.angle(unbalance))
     stamp_ns = start_ns + np.rint(time * NANOSECONDS).astype(np.int64)
     random = np.random.default_rng(truth.seed)
+    sensors = [Sensor(machine, channel, _acceleration(channel, shaken, truth.noise, random))
+               for channel in shaken.channels]
+    every = max(1, round(truth.rate_hz / SPEED_RATE_HZ))
     with LogFile(target) as log:
-        every = max(1, round(truth.rate_hz / 50.0))
-        log.write(_speeds(machine, stamp_ns[::every], speed[::every], shaken.angle[::every]))
-        for channel in shaken.channels:
-            for records in _samples(machine, channel, stamp_ns, shaken, truth.noise, random):
-                log.write(records)
+        # In the order of time, as a recorder writes: readers live through the file.
+        for start in range(0, len(time), round(truth.rate_hz * SLICE_S)):
+            part = slice(start, start + round(truth.rate_hz * SLICE_S))
+            told = slice(start + -start % every, part.stop, every)
+            log.write(_speeds(machine, stamp_ns[told], speed[told], shaken.angle[told]))
+            for sensor in sensors:
+                log.write(sensor.records(stamp_ns, part))
 
 
 def profile(truth: Truth) -> tuple[FloatArray, FloatArray]:
@@ -129,40 +134,49 @@ def _speeds(machine: str, stamp_ns: IntArray, speed: FloatArray, angle: FloatArr
                    JointStateWriter([ROTOR_JOINT]).write(stamps, values))
 
 
-def _samples(
-    machine: str, channel: str, stamp_ns: IntArray, shaken: Shaking, noise: float,
-    random: np.random.Generator,
-) -> Iterator[Records]:
-    """Yield the Imu messages of one sensor, whose axes are those of the machine."""
+def _acceleration(
+    channel: str, shaken: Shaking, noise: float, random: np.random.Generator,
+) -> FloatArray:
+    """Return what a sensor feels along the axes of the machine, (n, 3) [m/s^2]."""
     station = channel.rpartition('_')[0]
-    acceleration = np.zeros((len(stamp_ns), 3))
+    felt = np.zeros((len(shaken.acceleration), 3))
     for axis, column in (('x', 0), ('z', 2)):
         clean = shaken.acceleration[:, shaken.channels.index(f'{station}_{axis}')]
         deviation = noise * float(np.sqrt(np.mean(clean**2)))
-        acceleration[:, column] = clean + random.normal(scale=deviation, size=len(clean))
-    acceleration[:, 2] += GRAVITY
+        felt[:, column] = clean + random.normal(scale=deviation, size=len(clean))
+    felt[:, 2] += GRAVITY
+    return felt
+
+
+class Sensor:
+    """Packs the messages of one sensor by the thousand."""
+
+    def __init__(self, machine: str, channel: str, acceleration: FloatArray) -> None:
+        self._topic = f'/{machine}/measured/{channel}/imu'
+        self._acceleration = acceleration
+        frame = f'{SYNTHETIC}_{channel}'
+        self._blank = np.frombuffer(serialize_message(_message(frame)), dtype=np.uint8)
+        marked = _message(frame)
+        marked.linear_acceleration.x = 1.0
+        mark = np.frombuffer(serialize_message(marked), dtype=np.uint8)
+        # Of a double 1.0 the last two bytes are not zero: there its first byte is found.
+        at = int(np.flatnonzero(self._blank != mark)[-1]) - 7
+        self._kind = np.dtype({
+            'names': ['sec', 'nanosec', 'acceleration'], 'formats': ['<i4', '<u4', '(3,)<f8'],
+            'offsets': [STAMP.start, STAMP.start + 4, at], 'itemsize': len(self._blank)})
+
+    def records(self, stamp_ns: IntArray, part: slice) -> Records:
+        """Return the messages of a part of the run."""
+        stamps = stamp_ns[part]
+        rows = np.tile(self._blank, (len(stamps), 1)).view(self._kind)[:, 0]
+        rows['sec'], rows['nanosec'] = np.divmod(stamps, NANOSECONDS)
+        rows['acceleration'] = self._acceleration[part]
+        return Records(self._topic, IMU, stamps.tolist(), [row.tobytes() for row in rows])
+
+
+def _message(frame: str) -> Imu:
     message = Imu()
-    message.header.frame_id = f'{SYNTHETIC}_{channel}'
+    message.header.frame_id = frame
     message.orientation_covariance[0] = -1.0  # not measured
     message.angular_velocity_covariance[0] = -1.0
-    blank = np.frombuffer(serialize_message(message), dtype=np.uint8)
-    # Nothing but the covariance of the acceleration follows it: nine doubles and, of some
-    # middlewares, padding.
-    mark = Imu()
-    mark.header.frame_id = message.header.frame_id
-    mark.linear_acceleration.x = 1.0
-    plain = Imu()
-    plain.header.frame_id = message.header.frame_id
-    changed = np.flatnonzero(np.frombuffer(serialize_message(mark), dtype=np.uint8)
-                             != np.frombuffer(serialize_message(plain), dtype=np.uint8))
-    at = int(changed[-1]) - 7
-    kind = np.dtype({'names': ['sec', 'nanosec', 'acceleration'],
-                     'formats': ['<i4', '<u4', '(3,)<f8'],
-                     'offsets': [STAMP.start, STAMP.start + 4, at], 'itemsize': len(blank)})
-    for start in range(0, len(stamp_ns), BATCH):
-        part = slice(start, start + BATCH)
-        rows = np.tile(blank, (len(stamp_ns[part]), 1)).view(kind)[:, 0]
-        rows['sec'], rows['nanosec'] = np.divmod(stamp_ns[part], NANOSECONDS)
-        rows['acceleration'] = acceleration[part]
-        yield Records(f'/{machine}/measured/{channel}/imu', IMU, stamp_ns[part].tolist(),
-                      [row.tobytes() for row in rows])
+    return message

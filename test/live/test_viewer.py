@@ -5,7 +5,16 @@ import warnings
 import numpy as np
 import pytest
 
-from rotorsoil_ros.live.events import Diagnostics, Level, Measured, Predicted
+from rotorsoil_ros.case.criteria import Criteria
+from rotorsoil_ros.live.events import (
+    Band,
+    Compared,
+    Diagnostics,
+    Level,
+    Predicted,
+    Remark,
+    Zoned,
+)
 from rotorsoil_ros.live.run_log import LogSettings, open_viewer, RunLog
 from rotorsoil_ros.physics.errors import InputError
 
@@ -82,18 +91,114 @@ def test_trends_are_thinned_to_what_a_screen_shows_across_batches(recorded, mach
     assert np.diff(stamps).tolist() == [20 * 10**6] * 14  # 300 ms at 50 per second
 
 
-def test_measured_values_lie_beside_the_predicted_ones(recorded):
-    events = [Measured('fan', quantity, np.array([START]), ('disc_1_x', 'unknown'),
-                       np.array([[value, 7.0]]), np.full((1, 2), np.nan))
-              for quantity, value in (('amplitude', 2e-6), ('phase', np.pi))]
-    path = recorded(*events)
+def compared(machine, channels, amplitude, phase, *, speed=300.0, start=START):
+    """Return measured vectors (n, channels) of one speed, 100 ms apart."""
+    amplitude, phase = np.atleast_2d(amplitude), np.atleast_2d(phase)
+    unknown = np.full(amplitude.shape, np.nan)
+    return Compared(
+        'fan', start + 10 * PERIOD * np.arange(len(amplitude)), np.full(len(amplitude), speed),
+        channels, amplitude, phase, unknown, unknown.astype(complex), unknown, unknown)
+
+
+def test_measured_values_lie_beside_the_predicted_ones(recorded, machine):
+    path = recorded(compared(machine, ('disc_1_x',), [[2e-6]], [[1.5 * np.pi]]))
     assert column(path, '/fan/disc_1/x/amplitude/measured', 'Scalars:scalars') == (
         [START], [[pytest.approx(2.0)]])
     assert column(path, '/fan/disc_1/x/phase/measured', 'Scalars:scalars') == (
-        [START], [[pytest.approx(180.0)]])
+        [START], [[pytest.approx(-90.0)]])
     _, names = column(path, '/fan/disc_1/x/amplitude/measured', 'SeriesPoints:names',
                       static=True)
     assert names == [['disc_1_x measured']]
+
+
+def test_measured_amplitudes_without_phase_draw_no_phase(recorded, machine):
+    path = recorded(compared(machine, ('disc_1_x',), [[2e-6]], [[np.nan]]))
+    assert column(path, '/fan/disc_1/x/amplitude/measured', 'Scalars:scalars')[0] == [START]
+    assert column(path, '/fan/disc_1/x/phase/measured', 'Scalars:scalars')[0] == []
+
+
+def test_velocity_of_a_housing_is_its_speed_times_amplitude_as_rms(recorded, machine):
+    event = predicted(machine, [200.0])
+    path = recorded(event, compared(machine, ('bearing_1_housing_z',), [[1e-5]], [[0.0]],
+                                    speed=200.0))
+    shown = machine.table.channels.index('bearing_1_housing_z')
+    velocity = 200.0 * np.abs(event.prediction.displacement[0, shown]) / np.sqrt(2.0)
+    entity = '/fan/bearing_1/housing_z/velocity'
+    assert column(path, f'{entity}/predicted', 'Scalars:scalars')[1] == [
+        [pytest.approx(1e3 * velocity)]]
+    assert column(path, f'{entity}/measured', 'Scalars:scalars')[1] == [
+        [pytest.approx(np.sqrt(2.0))]]  # 2 mm/s zero-to-peak
+    assert column(path, '/fan/disc_1/x/velocity/predicted', 'Scalars:scalars')[1] == []
+
+
+def test_band_lies_around_the_prediction_under_its_name(recorded, machine):
+    count = len(machine.table.channels)
+    path = recorded(Band('fan', np.array([START]), np.array([200.0]),
+                         np.full((1, count), 1e-6), np.full((1, count), 3e-6)),
+                    predicted(machine, [200.0]))
+    low, high, line = ('soil_low', 'soil_high', 'predicted')
+    for side, value in ((low, 1.0), (high, 3.0)):
+        assert column(path, f'/fan/disc_1/x/amplitude/{side}', 'Scalars:scalars') == (
+            [START], [[pytest.approx(value)]])
+    names = [column(path, f'/fan/disc_1/x/amplitude/{what}', 'SeriesLines:names', static=True)[1]
+             for what in (low, high, line)]
+    assert names == [[['disc_1_x']]] * 3
+
+
+@pytest.fixture
+def judged(monkeypatch):
+    """Let criteria be found: no band, supports with a lowest frequency along z only."""
+    monkeypatch.setattr('rotorsoil_ros.live.viewer.stored_criteria', lambda *_: Criteria(
+        None, (), (np.inf, 100.0)))
+
+
+def zoned(predicted, measured):
+    return Zoned('fan', START, predicted, measured)
+
+
+def test_limits_of_zones_follow_the_class_of_the_support(recorded, machine, judged):
+    path = recorded(predicted(machine, [60.0]), zoned({'bearing_1_housing_x': 'A'}, {}),
+                    predicted(machine, [200.0], start=START + 2 * 10**9))
+    rigid, flexible = 1e3 * machine.case.zones.rigid[0], 1e3 * machine.case.zones.flexible[0]
+    found = {axis: column(path, f'/fan/limits/{axis}/A_B', 'Scalars:scalars')[1]
+             for axis in 'xz'}
+    assert found['z'] == [[pytest.approx(rigid)], [pytest.approx(flexible)]]
+    assert found['x'] == [[pytest.approx(rigid)], [pytest.approx(rigid)]]
+
+
+def test_a_lane_shows_when_a_zone_changed_and_nothing_when_it_is_not_known(recorded, machine):
+    path = recorded(
+        predicted(machine, [300.0]), zoned({'bearing_1_housing_x': 'A'}, {}),
+        zoned({'bearing_1_housing_x': 'A'}, {'bearing_1_housing_x': 'D'}),
+        predicted(machine, [300.0], start=START + 10**9),
+        zoned({'bearing_1_housing_x': 'B'}, {}))
+    lane = '/fan/zones/{}/bearing_1_housing_x'
+    assert column(path, lane.format('predicted'), 'StateChange:state') == (
+        [START, START + 10**9], [['A'], ['B']])
+    assert column(path, lane.format('measured'), 'StateChange:state') == (
+        [START, START + 10**9], [['D'], ['']])
+
+
+def test_remarks_stand_in_the_list_of_events_at_their_data(recorded, machine):
+    path = recorded(predicted(machine, [300.0]),
+                    Remark('fan', 17, Level.ERROR, 'bearing_1_housing_x: zone D'))
+    stamps, words = column(path, '/fan/events', 'TextLog:text')
+    assert (stamps, words) == ([START], [['14:13:20  bearing_1_housing_x: zone D']])
+    assert column(path, '/fan/events', 'TextLog:level')[1] == [['ERROR']]
+
+
+def test_a_file_takes_seconds_at_a_time_and_a_viewer_does_not_wait(machine, tmp_path):
+    from rerun.chunk import RrdReader
+    events = [predicted(machine, [300.0], start=START + second * 10**9) for second in range(12)]
+    path = tmp_path / 'run.rrd'
+    with open_viewer(path, {'fan': machine}) as viewer:
+        for event in events:
+            viewer.show([event])
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')
+        sent = [chunk for chunk in RrdReader(str(path)).stream()
+                if chunk.entity_path == '/fan/speed' and not chunk.is_static]
+    assert [chunk.to_record_batch().num_rows for chunk in sent] == [6, 6]
 
 
 def test_the_picture_says_its_scale_and_draws_no_shaft_without_a_prediction(recorded, machine):
@@ -140,7 +245,7 @@ def test_events_stand_at_the_data_that_they_follow_and_only_changes_are_told(rec
         health(Level.OK, 'fine'), health(Level.OK, 'still fine'), health(Level.WARN, 'oh'),
         flush_each=True)
     stamps, words = column(path, '/fan/events', 'TextLog:text')
-    assert words == [['OK: fine'], ['WARN: oh']]
+    assert words == [['14:13:20  fine'], ['14:13:20  oh']]
     assert stamps == [START, START]
 
 

@@ -1,0 +1,65 @@
+"""Which channels are shown together? Each is one entity and has one colour."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import rerun as rr
+
+from rotorsoil_ros.case.config import Case
+
+MICRO = 1e6  # [um, urad] per [m, rad]
+PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING = (
+    'Probes', 'Discs', 'Journals', 'Housings', 'Block', 'Rocking of the block')
+COLOURS = ((78, 154, 230), (255, 159, 54), (80, 190, 90), (235, 90, 90), (178, 133, 219),
+           (190, 130, 115), (240, 145, 205), (160, 160, 160), (208, 209, 60), (60, 205, 220))
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """One channel on the screen: its kind, its entity (split at the station), its colour."""
+
+    channel: str
+    kind: str
+    entity: str
+    colour: tuple[int, int, int]
+
+    @property
+    def unit(self) -> str:
+        """Unit in which its displacement is shown."""
+        return 'urad' if self.kind == ROCKING else 'um'
+
+    @property
+    def faint(self) -> tuple[int, int, int]:
+        """Its colour for what stays behind it."""
+        red, green, blue = (round(0.55 * part) for part in self.colour)
+        return red, green, blue
+
+
+def moving_housings(case: Case) -> list[str]:
+    """Return the bearings whose housings stand on something that gives way."""
+    blocks = {foundation.name for foundation in case.foundations}
+    return [bearing.name for bearing in case.rotor.bearings
+            if bearing.foundation in blocks or bearing.pedestal is not None]
+
+
+def trends(machine: str, case: Case, channels: Sequence[str]) -> list[Trend]:
+    """Return how the channels of a case are shown."""
+    owners = {bearing.name: JOURNALS for bearing in case.rotor.bearings}
+    owners |= {disc.name: DISCS for disc in case.rotor.discs}
+    owners |= {probe.name: PROBES for probe in case.rotor.probes}
+    owners |= {foundation.name: BLOCK for foundation in case.foundations}
+    shown: list[Trend] = []
+    for channel in channels:
+        owner = max((name for name in owners if channel.startswith(f'{name}_')), key=len)
+        motion = channel.removeprefix(f'{owner}_')
+        kind = _kind(motion, owners[owner])
+        colour = COLOURS[sum(trend.kind == kind for trend in shown) % len(COLOURS)]
+        entity = rr.new_entity_path([machine, owner, motion])
+        shown.append(Trend(channel, kind, entity, colour))
+    return shown
+
+
+def _kind(motion: str, kind_of_owner: str) -> str:
+    if motion.startswith('housing'):
+        return HOUSINGS
+    return ROCKING if kind_of_owner == BLOCK and motion.startswith('r') else kind_of_owner
