@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.physics.arrays import FloatArray
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.rotor import Rotor
@@ -72,14 +72,14 @@ def shake(
 
     Notes
     -----
-    Soil acts as spring and dashpot with the dynamic stiffness at the momentary speed: exact for
-    what turns with the rotor, a good stand-in for free vibration near it (design note, 5.1).
+    Soil acts as spring and dashpot with the compliance at the momentary speed: exact for what
+    turns with the rotor, a good stand-in for free vibration near it (design note, 5.1).
     Newmark's error is (omega dt)^2 / 12 of a frequency.
 
     """
     if any(bearing.pedestal is not None for bearing in model.rotor.bearings) or model.couples:
         raise RotorSoilError('integration in time knows no pedestals and no couples')
-    system = _System(model)
+    system = _System(model, speed)
     step = float(time[1] - time[0])
     rate = np.gradient(speed, time)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
@@ -108,15 +108,15 @@ def unbalance_force(
 
 
 class _System:
-    """Equations of motion in rotor shapes of x, of z, and the six motions of every block."""
+    """Equations of motion in rotor shapes of x, of z, and what of every block can move."""
 
-    def __init__(self, model: CoupledModel) -> None:
+    def __init__(self, model: CoupledModel, speed: FloatArray) -> None:
         rotor = model.rotor
         stiffness, mass, polar = rotor.plane_matrices
         shapes = _shapes(stiffness, mass, [2 * rotor.node_of(bearing.position)
                                            for bearing in rotor.bearings])
         count = shapes.shape[1]
-        self._model, self._modes = model, count
+        self._model = model
         size = 2 * count + 6 * len(model.foundations)
         plane = slice(0, count), slice(count, 2 * count)
         self.mass, self._shaft, self._gyroscopic = (np.zeros((size, size)) for _ in range(3))
@@ -140,25 +140,44 @@ class _System:
         # `_rows` has all x first, bearings have x and z in turn.
         order = np.arange(2 * len(rotor.bearings)).reshape(2, -1).T.ravel()
         self._stretch = journals[order] - self.housings
+        self._hold(blocks, np.array([speed.min(), speed.max()]))
 
-    def matrices(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return stiffness and damping at speeds (n,) [rad/s], (n, d, d) each."""
+    def _hold(self, blocks: int, speed: FloatArray) -> None:
+        """Leave out what the soil holds entirely."""
+        gives = np.any(self._soils(speed) != 0.0, axis=(0, 1))
+        self._free = np.flatnonzero(gives)
+        kept = np.concatenate([np.arange(blocks), blocks + self._free])
+        for name in ('mass', '_shaft', '_gyroscopic'):
+            setattr(self, name, getattr(self, name)[np.ix_(kept, kept)])
+        self.discs, self.housings = self.discs[kept], self.housings[:, kept]
+        self._stretch = self._stretch[:, kept]
+
+    def _soils(self, speed: FloatArray) -> ComplexArray:
+        """Return the compliance under all blocks, (n, 6 f, 6 f)."""
+        size = 6 * len(self._model.soil_models)
+        total = np.zeros((len(speed), size, size), dtype=complex)
+        for index, soil in enumerate(self._model.soil_models):
+            own = slice(6 * index, 6 * index + 6)
+            total[:, own, own] = soil.compliance(speed)
+        return total
+
+    def matrices(self, speed: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
+        """
+        Return what resists at speeds (n,) [rad/s].
+
+        Returns
+        -------
+        stiffness, damping : (n, d, d) float arrays
+            Of the rotor on its bearings; the last coordinates are those of the soil.
+        compliance : (n, s, s) complex array
+            Of the soil, over the last s coordinates.
+
+        """
         spring, damper = self._model.bearing_coefficients(speed)
         stiffness = self._shaft + self._stretch.T @ spring @ self._stretch
         damping = (self._stretch.T @ damper @ self._stretch
                    + speed[:, None, None] * self._gyroscopic)
-        for index, soil in enumerate(self._model.soil_models):
-            first = 2 * self._modes + 6 * index
-            compliance = soil.compliance(speed)
-            free = np.flatnonzero(np.any(compliance != 0.0, axis=(0, 1)))
-            # Here the stiffness itself is wanted: it is an entry of the equations of motion.
-            dynamic = np.linalg.inv(compliance[:, free[:, None], free])
-            rows, columns = first + free[:, None], first + free
-            stiffness[:, rows, columns] += dynamic.real
-            damping[:, rows, columns] += dynamic.imag / speed[:, None, None]
-            for dof in set(range(6)) - set(free.tolist()):
-                stiffness[:, first + dof, first + dof] += 1e6 * np.abs(stiffness).max()
-        return stiffness, damping
+        return stiffness, damping, self._soils(speed)[:, self._free[:, None], self._free]
 
 
 def _shapes(stiffness: FloatArray, mass: FloatArray, journals: list[int]) -> FloatArray:
@@ -197,19 +216,59 @@ def _rows(rotor: Rotor, shapes: FloatArray, places: list[float], size: int) -> F
 def _newmark(system: _System, speed: FloatArray, load: FloatArray, step: float) -> FloatArray:
     """Step through the run; return accelerations, (n, d)."""
     starts = np.arange(0, len(speed), _FROZEN)
-    stiffness, damping = system.matrices(speed[np.minimum(starts + _FROZEN // 2,
-                                                          len(speed) - 1)])
-    inverse = np.linalg.inv(
-        system.mass + _GAMMA * step * damping + _BETA * step**2 * stiffness)
+    inverse, damping, stiffness = _steppers(
+        system, speed[np.minimum(starts + _FROZEN // 2, len(speed) - 1)], step)
     place, velocity, acceleration = (np.zeros(load.shape[1]) for _ in range(3))
     found = np.empty_like(load)
     for number, start in enumerate(starts.tolist()):
         for index in range(start, min(start + _FROZEN, len(speed))):
             place = place + step * velocity + (0.5 - _BETA) * step**2 * acceleration
             velocity = velocity + (1.0 - _GAMMA) * step * acceleration
-            acceleration = inverse[number] @ (
-                load[index] - damping[number] @ velocity - stiffness[number] @ place)
+            acceleration = (inverse[number] @ load[index] - damping[number] @ velocity
+                            - stiffness[number] @ place)
             place = place + _BETA * step**2 * acceleration
             velocity = velocity + _GAMMA * step * acceleration
             found[index] = acceleration
     return found
+
+
+def _steppers(
+    system: _System, speed: FloatArray, step: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return what load, predicted velocity and predicted place do to the acceleration.
+
+    Notes
+    -----
+    With q and q' of the contact and the momentary speed W, a soil of spring K and dashpot C,
+    1 / N = K + i W C, exerts r = K q + C q' = Re R where N R = q - i q' / W. That is an equation
+    for R with the compliance itself: it stands beside the equations of motion, and nothing is
+    inverted for it.
+
+    Returns
+    -------
+    three (n, d, d) float arrays
+
+    """
+    stiffness, damping, compliance = system.matrices(speed)
+    count, size, own = len(speed), system.mass.shape[0], compliance.shape[1]
+    # Of the soil's equations and unknowns: entries near one, whatever the unit.
+    unit = np.sqrt(np.abs(np.einsum('nii->ni', compliance)).max(axis=0))
+    scaled = compliance / (unit[:, None] * unit)
+    pick = np.eye(size)[size - own:] / unit[:, None]
+    total = np.zeros((count, size + 2 * own, size + 2 * own))
+    real, imaginary = slice(size, size + own), slice(size + own, size + 2 * own)
+    total[:, :size, :size] = system.mass + _GAMMA * step * damping + _BETA * step**2 * stiffness
+    total[:, :size, real] = pick.T
+    total[:, real, :size] = -_BETA * step**2 * pick
+    total[:, imaginary, :size] = _GAMMA * step / speed[:, None, None] * pick
+    total[:, real, real] = total[:, imaginary, imaginary] = scaled.real
+    total[:, real, imaginary], total[:, imaginary, real] = -scaled.imag, scaled.imag
+    right = np.zeros((count, size + 2 * own, 3 * size))
+    right[:, :size, :size] = np.eye(size)
+    right[:, :size, size:2 * size], right[:, :size, 2 * size:] = damping, stiffness
+    # What is predicted of the contact, with the signs of the terms that are subtracted.
+    right[:, imaginary, size:2 * size] = pick / speed[:, None, None]
+    right[:, real, 2 * size:] = -pick
+    found = np.linalg.solve(total, right)[:, :size]
+    return found[..., :size], found[..., size:2 * size], found[..., 2 * size:]

@@ -10,16 +10,16 @@ from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.orders import demodulate, SpeedTrack
 from rotorsoil_ros.physics.time_domain import shake, unbalance_force
 
-from machines import CONTACT, paper_machine, SOIL
+from machines import CONTACT, paper_machine, Restrained, SOIL
 
 MACHINE = paper_machine(ConeModel(SOIL, CONTACT), mass=420.0)
 MOMENT, PHASE = np.array([1e-5, 4e-6]), np.array([0.3, -1.1])
 
 
-def steady(speed, *, seconds, step):
+def steady(speed, *, seconds, step, machine=MACHINE):
     time = np.arange(0.0, seconds, step)
     turning = np.full(len(time), speed)
-    shaken = shake(MACHINE, time, turning, moment=np.tile(MOMENT, (len(time), 1)), phase=PHASE)
+    shaken = shake(machine, time, turning, moment=np.tile(MOMENT, (len(time), 1)), phase=PHASE)
     late = time > 0.7 * seconds
     track = SpeedTrack(time, turning, angle=shaken.angle)
     return shaken.channels, np.array([
@@ -35,6 +35,25 @@ def test_steady_vibration_is_the_response_to_unbalance(speed):
     # Newmark lets a vibration at 1/4 of the lowest natural frequency (280 rad/s) lag little:
     # (280 step)^2 / 12 = 0.7 % of its frequency; shaft modes without damping still ring a bit.
     np.testing.assert_allclose(got, expected, rtol=0.02)
+
+
+class Coupled:
+    """Cones whose sway and rocking are coupled."""
+
+    def compliance(self, omega):
+        values = ConeModel(SOIL, CONTACT).compliance(omega)
+        values[:, 0, 4] = values[:, 4, 0] = 0.5 * np.sqrt(values[:, 0, 0] * values[:, 4, 4])
+        return values
+
+
+@pytest.mark.parametrize('soil', [Restrained(ConeModel(SOIL, CONTACT), 'z', 'ry'), Coupled()],
+                         ids=['held in four directions', 'coupled'])
+def test_contact_moves_by_its_compliance_where_it_may(soil):
+    machine = paper_machine(soil, mass=420.0)
+    channels, got = steady(200.0, seconds=8.0, step=1e-3, machine=machine)
+    expected = machine.unbalance_response(np.array([200.0]), MOMENT * np.exp(1j * PHASE))
+    expected = expected.displacement[0, [machine.channels.index(name) for name in channels]]
+    np.testing.assert_allclose(got, expected, rtol=0.02)  # as above
 
 
 def test_run_up_shows_the_force_of_the_speeding_rotor():
