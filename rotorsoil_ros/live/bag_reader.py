@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import errno
 import io
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -155,7 +156,9 @@ def opened(file: Path) -> Iterator[BinaryIO]:
             stream.seek(0)
             yield stream
     except OSError as error:
-        raise InputError(f'{file}: {error.strerror}') from error
+        # A place that no file has comes from an index that somebody damaged.
+        said = 'is damaged' if error.errno == errno.EINVAL else error.strerror
+        raise InputError(f'{file}: {said}') from error
     except BROKEN as error:
         raise InputError(f'{file}: is damaged ({error or type(error).__name__})') from error
 
@@ -171,8 +174,8 @@ def _chunks(file: Path, wanted: Wanted) -> Iterator[list[Entry]]:
         stream.seek(len(MCAP0_MAGIC))
         while (opcode := contents.read(stream)) not in (Opcode.DATA_END, Opcode.FOOTER):
             if opcode == Opcode.CHUNK or len(contents.entries) >= LOOSE:
-                yield contents.take()
-        yield contents.take()
+                yield sorted(contents.take(), key=_time)
+        yield sorted(contents.take(), key=_time)
 
 
 def _overlap(indexes: Sequence[ChunkIndex]) -> bool:

@@ -151,6 +151,11 @@ class Judge:
             has_phase=any(np.isfinite(each.phase).any() for each in compared),
             is_steady=self.history.is_steady(), counts=self._counts())
 
+    def finish(self, now_ns: int) -> Iterator[Event]:
+        """Judge the passage that the end of the run has cut short."""
+        if self._criteria is not None:
+            yield from self._passing.cut_short(now_ns, self._criteria.resonances)
+
     def _matched(self, *, is_tick: bool = False) -> Iterator[Compared]:
         """Yield what has found its speed."""
         by_channels: dict[tuple[str, ...], list[Vectors]] = {}
@@ -198,7 +203,7 @@ class Judge:
             self._vibration.predict(
                 {name: speed * abs(row[column]) / math.sqrt(2.0)
                  for column, name in enumerate(self._predictor.channels)
-                 if HOUSING in name and np.isfinite(row[column])}, speed, natural)
+                 if HOUSING in name and abs(row[column]) > 0.0}, speed, natural)
 
     def _counting(self, compared: Compared, criteria: Criteria) -> BoolArray:
         """Return which points may be held against the machine, (n, channels)."""

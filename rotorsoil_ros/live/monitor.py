@@ -97,6 +97,10 @@ class Monitor:
         health = self.health.tick(now_ns, stale_after_s=stale_after_s)
         self._emit(replace(health, parts=parts) if parts else health)
 
+    def finish(self, now_ns: int) -> None:
+        """Say what can only be said at the end of a run."""
+        self._emit_all(self.judge.finish(now_ns))
+
     def _emit(self, event: Event) -> None:
         for sink in self._sinks:
             sink(event)

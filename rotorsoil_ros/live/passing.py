@@ -16,6 +16,7 @@ from rotorsoil_ros.physics.units import rad_s_to_rpm
 
 MOST = 4096  # points of a channel; a longer passage keeps every second one
 SETTLED_S = 5.0
+SILENT_TICKS = 5
 
 
 @dataclass(slots=True, eq=False)
@@ -71,10 +72,12 @@ class Passing:
     def __init__(self, machine: str, history: History, *, margin: float) -> None:
         self._machine, self._history, self._margin = machine, history, margin
         self._traces: dict[str, Trace] = {}
+        self._silent_ticks = 0
         self.faults: list[str] = []
 
     def take(self, compared: Compared) -> None:
         """Collect measured points."""
+        self._silent_ticks = 0
         for column, channel in enumerate(compared.channels):
             new = Trace.of(compared, column)
             before = self._traces.get(channel)
@@ -88,6 +91,9 @@ class Passing:
         found = sweeps(longest.speed)
         if len(found) > 1:
             return self._judge(now_ns, resonances, int(longest.stamp_ns[found[0].stop - 1]))
+        self._silent_ticks += 1
+        if found and self._silent_ticks > SILENT_TICKS:
+            return self.cut_short(now_ns, resonances)
         speed = self._history.last_speed
         if abs(self._history.rate(SETTLED_S)) <= STEADY * speed and (
                 longest.stamp_ns[-1] - longest.stamp_ns[0] > SETTLED_S * 1e9):
@@ -96,6 +102,11 @@ class Passing:
                 return self._judge(now_ns, resonances, last_ns)
             self._cut(last_ns)
         return []
+
+    def cut_short(self, now_ns: int, resonances: tuple[Resonance, ...]) -> list[Remark]:
+        """Return what is to be said of a passage after which nothing more is measured."""
+        last_ns = max((int(trace.stamp_ns[-1]) for trace in self._traces.values()), default=0)
+        return self._judge(now_ns, resonances, last_ns) if self._traces else []
 
     def _judge(
         self, now_ns: int, resonances: tuple[Resonance, ...], until_ns: int,

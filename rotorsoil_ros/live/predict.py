@@ -105,6 +105,7 @@ def _feed(
         yield len(batch.payloads)
     if now_ns is not None:
         monitor.tick(now_ns, stale_after_s=math.inf)
+        monitor.finish(now_ns)
 
 
 def _inputs(profile: Path, name: str) -> dict[str, tuple[Place, int]]:

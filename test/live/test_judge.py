@@ -486,3 +486,31 @@ def test_what_is_passed_too_fast_does_not_count_against_the_machine(fan, basis):
         run_up(run, rate=20.0, factor=10.0)
     used = [len(run.monitor.judge._vibration._inside[PEAKED]) for run in (slow, fast)]
     assert used[1] < used[0]
+
+
+def pass_and_stop(run):
+    """Run up past a peak that is 10 % too low; return when the last vector was measured [s]."""
+    for number in range(700):
+        speed = 80.0 + 0.15 * number
+        run.turns(1.0 + 0.1 * number, speed)
+        run.vector(1.0 + 0.1 * number, run.expected(min(speed / 0.9, FASTEST), PEAKED),
+                   channel=PEAKED)
+    return 1.0 + 69.9
+
+
+def test_a_passage_that_the_end_of_the_run_cuts_short_is_judged_at_the_end(run):
+    end = pass_and_stop(run)
+    run.ticks(end)
+    assert not peaks(run)
+    run.monitor.finish(round(end * SECOND))
+    assert [event.level for event in peaks(run)] == [Level.WARN]
+    run.monitor.finish(round(end * SECOND))
+    assert len(peaks(run)) == 1
+
+
+def test_a_passage_is_over_when_nothing_more_is_measured(run):
+    end = pass_and_stop(run)
+    for second in range(1, 9):
+        run.turns(end + second, 185.0 - 0.1 * second)
+        run.ticks(end + second)
+    assert [event.level for event in peaks(run)] == [Level.WARN]
