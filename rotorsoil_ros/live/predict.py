@@ -10,17 +10,17 @@ from pathlib import Path
 from rotorsoil_ros.case.criteria import criteria
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.bag_writer import LogFile
-from rotorsoil_ros.live.events import NANOSECONDS
+from rotorsoil_ros.live.events import LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.live.inlets import Inlet, inlet, ROTOR_JOINT, SPEED_TOPICS
 from rotorsoil_ros.live.judge import Judging
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Encoder, Messenger, Records, Topics
 from rotorsoil_ros.live.monitor import Monitor
-from rotorsoil_ros.live.profile import Place, place
+from rotorsoil_ros.live.profile import BATCH, Place, place
 from rotorsoil_ros.live.run_log import open_viewer
 from rotorsoil_ros.physics.errors import InputError
 
-AT_ONCE = 128  # speeds; measurements of the same time must find them
+AT_ONCE = 128  # speeds that may be told before measurements of the same time find them
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +74,11 @@ def predict(
             machine.case, machine.model, machine.case.unbalance, machine.directory))
         inlets = {topic: inlet(found.name, topic, monitor, rotor_joint=rotor_joint, log=log.write)
                   for topic, (found, _) in inputs.items()}
+        at_most, span_ns = BATCH, LAST_STAMP
+        if any(found.name not in SPEED_TOPICS for found, _ in inputs.values()):
+            at_most, span_ns = AT_ONCE, NANOSECONDS
         batches = bag_reader.batches(profile, lambda topic, _: topic in inputs,
-                                     at_most=AT_ONCE, span_ns=NANOSECONDS)
+                                     at_most=at_most, span_ns=span_ns)
         total, done = sum(number for _, number in inputs.values()), 0
         description = machine.description(name, machine.case.unbalance)
         for number in _feed(batches, inlets, monitor, description):
