@@ -51,22 +51,28 @@ from sensor_msgs.msg import JointState
 
 names = [f'bearing_{i}_journal_x' for i in range(18)]
 values = [0.001 * i for i in range(18)]
+reliability, *machines = sys.argv[1:]
+qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy[reliability.upper()])
 rclpy.init()
 node = rclpy.create_node('rotorsoil')
-publishers = [node.create_publisher(JointState, f'~/paper_rotor/{kind}', 10)
-              for kind in ('amplitude', 'phase')]
 
-def on_speed(message):
-    speed = message.velocity[message.name.index('rotor')]
-    for publisher in publishers:
-        answer = JointState()
-        answer.header.stamp = message.header.stamp
-        answer.name = names
-        answer.position = answer.velocity = answer.effort = [speed * v for v in values]
-        publisher.publish(answer)
+def watch(machine):
+    publishers = [node.create_publisher(JointState, f'~/{machine}/{kind}', 10)
+                  for kind in ('amplitude', 'phase')]
 
-qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
-node.create_subscription(JointState, 'paper_rotor/joint_states', on_speed, qos)
+    def on_speed(message):
+        speed = message.velocity[message.name.index('rotor')]
+        for publisher in publishers:
+            answer = JointState()
+            answer.header.stamp = message.header.stamp
+            answer.name = names
+            answer.position = answer.velocity = answer.effort = [speed * v for v in values]
+            publisher.publish(answer)
+
+    node.create_subscription(JointState, f'{machine}/joint_states', on_speed, qos)
+
+for machine in machines:
+    watch(machine)
 executor = EventsExecutor()
 executor.add_node(node)
 try:
@@ -243,7 +249,7 @@ def commands(directory: Path) -> dict[str, list[str]]:
             '-p', 'machines:=[paper_rotor]', '-p', f'paper_rotor.case:={CASE}',
             '-p', 'speed_depth:=1000', '-p', f'cache:={directory / "cache"}']
     logged = [*ours, '-p', f'log.directory:={directory / "logs"}', '-p']
-    return {'bare': [sys.executable, '-c', BARE], 'no log': ours,
+    return {'bare': [sys.executable, '-c', BARE, 'best_effort', 'paper_rotor'], 'no log': ours,
             'MCAP': [*logged, 'log.rerun:=false'], 'MCAP and rerun': [*logged, 'log.rerun:=true']}
 
 
