@@ -1,7 +1,7 @@
 """Does the machine behave as predicted? Measured vectors against the answers, while it runs."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 import math
 
@@ -140,7 +140,7 @@ class Judge:
                 self._pairing.take_demodulated(found)
         self._pairing.tick()
         yield from self._matched(is_tick=True)
-        criteria, compared = self._criteria, self._compared
+        criteria, compared = self._criteria, _joined(self._compared)
         self._compared = []
         if criteria is not None:
             self._weigh(criteria, compared)
@@ -234,3 +234,13 @@ class Judge:
                 'samples_left_out': sum(each.left_out for each in self._demodulators.values()),
                 'raw_channels': len(self._demodulators)}
 
+
+def _joined(found: Sequence[Compared]) -> list[Compared]:
+    """Return what was compared since the last tick, once for each set of channels."""
+    by_channels: dict[tuple[str, ...], list[Compared]] = {}
+    for each in found:
+        by_channels.setdefault(each.channels, []).append(each)
+    arrays = [entry.name for entry in fields(Compared) if entry.name not in ('machine', 'channels')]
+    return [Compared(machine=parts[0].machine, channels=channels, **{
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays})
+        for channels, parts in by_channels.items()]
