@@ -223,8 +223,8 @@ def _reference(run: Run, expectation: Expectation | None) -> tuple[Reference, li
         nothing = np.full(run.displacement.shape, np.nan)
         found = np.array(_numbers(run.description.get('speed_range_rad_s')) or [0.0, np.inf])
         return Reference(
-            run.stamp_ns, run.speed, run.channels, run.displacement, *[nothing] * 4,
-            (float(found[0]), float(found[1]))), [
+            run.stamp_ns, run.speed, run.channels, run.displacement, nothing, nothing,
+            nothing, nothing, (float(found[0]), float(found[1]))), [
             'no case given: no band, no critical speeds and damping of the model (nothing is '
             'marked as not quasi-static but around measured peaks), no zones']
     tables = run.description.get('tables')

@@ -240,7 +240,7 @@ def _joined(found: Sequence[Compared]) -> list[Compared]:
     by_channels: dict[tuple[str, ...], list[Compared]] = {}
     for each in found:
         by_channels.setdefault(each.channels, []).append(each)
-    arrays = [entry.name for entry in fields(Compared) if entry.name not in ('machine', 'channels')]
+    arrays = {entry.name for entry in fields(Compared)} - {'machine', 'channels'}
     return [Compared(machine=parts[0].machine, channels=channels, **{
         name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays})
         for channels, parts in by_channels.items()]
