@@ -1,4 +1,4 @@
-"""The main job for real: a node process and a replay process talk DDS on this host."""
+"""The main job for real: node and replay talk DDS on this host; then a comparison."""
 
 from argparse import Namespace
 from collections.abc import Iterator
@@ -19,6 +19,7 @@ from sensor_msgs.msg import JointState
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.plots import all_figures, trend
+from rotorsoil_ros.cli.demo_comparison import demonstrate_comparison
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.events import NANOSECONDS
@@ -50,7 +51,7 @@ class _Answers:
 
 
 def demo(arguments: Namespace) -> int:
-    """Run up, dwell and coast down a machine before a live node; leave log and pictures."""
+    """Run a machine before a live node, then compare another; leave logs and pictures."""
     out: Path = arguments.output
     out.mkdir(parents=True, exist_ok=True)
     # Tables of the demo are its own: what it shows was computed here.
@@ -68,6 +69,8 @@ def demo(arguments: Namespace) -> int:
     answers = _read(log)
     _draw(model, table, answers, out / 'plots', case=case)
     _summarise(case, answers, out, log)
+    print()
+    demonstrate_comparison(out / 'comparison', directory, start_ns=time.time_ns())
     return 0
 
 

@@ -20,8 +20,8 @@ from rotorsoil_ros.physics.units import rad_s_to_rpm
 
 WIDTH, AMPLITUDE, PHASE = 230.0, (60.0, 0.0), (108.0, 78.0)
 BOUNDS = rrb.VisualBounds2D(x_range=(-30.0, WIDTH + 28.0), y_range=(-8.0, 128.0))
-DECADES = 3
-HEADROOM = 3.0  # above the largest prediction
+DECADES = 4
+HEADROOM = 10.0  # above the largest prediction, for what is measured
 TRAIL = 400  # measured points that stay
 RESOLUTION = 400  # of speed: a point closer to the last one replaces nothing
 TRAIL_NS = 2 * NANOSECONDS

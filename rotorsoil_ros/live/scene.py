@@ -96,7 +96,7 @@ class Scene:
     def name_place(self, station: Station) -> tuple[float, float, float]:
         """Return where the name of a station stands: a disc's above it, others at the foot."""
         if station.radius > 0.0:
-            return 0.0, station.y, self.shaft_height + 1.2 * station.radius
+            return 0.0, station.y, self.shaft_height + station.radius + 0.08 * self.extent
         return 0.0, station.y, 0.6 * self.shaft_height
 
     def stations_at(self, displacement: ComplexArray, turn: FloatArray) -> FloatArray:

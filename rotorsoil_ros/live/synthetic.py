@@ -13,7 +13,7 @@ from rotorsoil_ros.live.events import NANOSECONDS
 from rotorsoil_ros.live.imu import IMU, SYNTHETIC
 from rotorsoil_ros.live.inlets import ROTOR_JOINT
 from rotorsoil_ros.live.messages import JOINT_STATE, JointStateWriter, Records
-from rotorsoil_ros.physics.arrays import FloatArray, IntArray
+from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.coupled import CoupledModel
 from rotorsoil_ros.physics.soil_neighbours import on_soils
 from rotorsoil_ros.physics.time_domain import shake, Shaking
@@ -60,7 +60,7 @@ class Truth:
 
 
 def write_synthetic(
-    target: Path, machine: str, model: CoupledModel, unbalance: FloatArray, *, truth: Truth,
+    target: Path, machine: str, model: CoupledModel, unbalance: ComplexArray, *, truth: Truth,
     start_ns: int,
 ) -> None:
     """
@@ -91,7 +91,7 @@ def write_synthetic(
     time, speed = profile(truth)
     moment = np.abs(unbalance) * (1.0 + truth.growth * time / time[-1])[:, None]
     shaken = shake(on_ground(model, truth.shear_modulus_factor), time, speed, moment=moment,
-                   phase=np.angle(unbalance))
+                   phase=np.asarray(np.angle(unbalance), dtype=float))
     stamp_ns = start_ns + np.rint(time * NANOSECONDS).astype(np.int64)
     random = np.random.default_rng(truth.seed)
     sensors = [Sensor(machine, channel, _acceleration(channel, shaken, truth.noise, random))

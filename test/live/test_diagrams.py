@@ -95,8 +95,8 @@ def test_a_measured_point_that_is_predicted_lies_on_the_line(paper, machine, bod
     bode.compare(measured('disc_1_x', 2.0 * abs(vector), np.nan, stamp_ns=START + 3 * SECOND))
     points = np.array(paper.drawn['bode/disc_1_x/measured', 'Points2D:positions'][0])
     assert len(points) == 3  # of the second one no phase is known
-    # A factor of two on 60 units for three decades.
-    assert points[0, 1] - points[1, 1] == pytest.approx(20.0 * np.log10(2.0), rel=1e-5)
+    # A factor of two on 60 units for four decades.
+    assert points[0, 1] - points[1, 1] == pytest.approx(15.0 * np.log10(2.0), rel=1e-5)
 
 
 def test_at_a_steady_state_no_points_are_piled_up(paper, bode):
@@ -118,10 +118,10 @@ def test_another_unbalance_moves_the_curve_and_another_case_removes_it(paper, ma
     view.take(Model('fan', START, description))
     view.flush()
     heights = [np.concatenate(lines)[:, 1] for lines in (before, paper.drawn[entity])]
-    inside = heights[0] < 39.0  # below, the lower curve is at the end of its axis
+    inside = heights[0] < 44.0  # below, the lower curve is at the end of its axis
     assert inside.any()
     decade = (heights[1] - heights[0])[inside]
-    np.testing.assert_allclose(decade, 20.0, atol=0.01)  # downward
+    np.testing.assert_allclose(decade, 15.0, atol=0.01)  # downward
     view.take(Model('fan', START, {**description, 'tables': {'response': 'another'}}))
     view.flush()
     assert paper.drawn[entity] == []
