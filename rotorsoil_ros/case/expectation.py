@@ -133,8 +133,8 @@ class Expectation:
                 envelope = self.envelope(unbalance).at(speed[part])
                 bounds[:, part] = (envelope.low, envelope.high, envelope.behind, envelope.ahead)
         return Reference(stamp_ns, speed, self.table.channels,
-                         displacement if logged is None else logged, *bounds,
-                         self.table.speed_range)
+                         displacement if logged is None else logged, bounds[0], bounds[1],
+                         bounds[2], bounds[3], self.table.speed_range)
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:
         """Return the band under one unbalance [kg m]; only where there is a band."""
