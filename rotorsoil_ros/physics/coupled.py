@@ -183,7 +183,8 @@ class CoupledModel:
 
         """
         omega = np.asarray(omega, dtype=float)
-        modes = WhirlModes.at(self.rotor, self._ports, springs=self.nominal_springs, speed=speed)
+        modes = WhirlModes.at(self.rotor, self._ports, springs=self.nominal_springs, speed=speed,
+                              highest=float(np.abs(omega).max(initial=0.0)))
         return self._forced(modes, omega, np.full(len(omega), float(speed)), channel)
 
     def harmonic_response(

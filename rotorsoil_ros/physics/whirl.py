@@ -7,6 +7,7 @@ import scipy.linalg
 
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.physics.errors import NotSolvedError
+from rotorsoil_ros.physics.projection import shapes_at_ports
 from rotorsoil_ros.physics.rotor import Rotor
 
 # A mode whose dynamic stiffness fell below this share of its static one is kept out of the sum
@@ -17,6 +18,9 @@ _NEAR_POLE = 1e-3
 # frequencies, are summed once as a power series; so many terms leave less than round-off.
 _FAR = 16.0
 _TERMS = 13
+
+_LOOSE = ('the shaft on its bearings is not stiff in every direction: its modes cannot be '
+          'found')
 
 # Orbit of a unit whirl over (x, z): forward turns with the spin, from z into x.
 ORBITS = np.array([[-1j, 1.0], [1j, 1.0]]) / np.sqrt(2.0)
@@ -80,13 +84,32 @@ class WhirlModes:
     @classmethod
     def at(
         cls, rotor: Rotor, ports: list[int], *, springs: FloatArray, speed: float,
+        highest: float,
     ) -> 'WhirlModes':
-        """Solve for the modes at fixed speed [rad/s]; parameters as in `of`."""
-        stiffness, mass, polar = held(rotor, springs)
+        """
+        Solve for the modes at fixed speed.
+
+        Parameters
+        ----------
+        rotor, ports, springs
+            As in `of`.
+        speed : float
+            Of the rotor [rad/s].
+        highest : float
+            Frequency up to which the receptance is wanted [rad/s]: of many elements no more
+            shapes are kept than it takes.
+
+        """
+        matrices = held(rotor, springs)
+        try:
+            basis = shapes_at_ports(*matrices, ports, highest=highest, speed=speed)
+        except np.linalg.LinAlgError as error:
+            raise NotSolvedError(_LOOSE) from error
+        stiffness, mass, polar = (basis.T @ matrix @ basis for matrix in matrices)
         squares, rest = _modes(mass, stiffness)
         inverse, vectors = np.linalg.eigh(
             spinning(np.maximum(squares, 0.0), rest.T @ polar @ rest, np.array([speed])))
-        shapes = rest[ports] @ vectors[0, :len(rest)]
+        shapes = basis[ports] @ rest @ vectors[0, :len(rest)]
         return cls(np.array([inverse[0], -inverse[0]]), np.array([shapes, shapes]), 1)
 
     def receptance(self, omega: FloatArray) -> 'PortReceptance':
@@ -133,8 +156,7 @@ def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatAr
     try:
         inverse, shapes = scipy.linalg.eigh(mass, stiffness)
     except scipy.linalg.LinAlgError as error:
-        raise NotSolvedError('the shaft on its bearings is not stiff in every direction: its '
-                             'modes cannot be found') from error
+        raise NotSolvedError(_LOOSE) from error
     return inverse, shapes
 
 
