@@ -1,7 +1,7 @@
 """The pieces into which a sharp function is cut so that polynomials can stand for it."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -86,8 +86,9 @@ class Pieces:
 
 
 def evaluate(
-    pieces: Pieces, coefficients: FloatArray, place: FloatArray, index: IntArray,
-) -> FloatArray:
+    pieces: Pieces, coefficients: FloatArray, place: FloatArray, index: IntArray, *,
+    out: FloatArray,
+) -> None:
     """
     Evaluate piecewise polynomials times the squared place.
 
@@ -101,23 +102,28 @@ def evaluate(
         Inside the edges.
     index : (n,) int array
         Piece that holds each place.
-
-    Returns
-    -------
-    (n, w) float array
-        The same to the last bit however many places are evaluated together: products and sums
-        are taken element by element and in one order, unlike those of a matrix product.
+    out : (n, w) float array
+        Takes the values: the same to the last bit however many places are evaluated together,
+        because products and sums are taken element by element and in one order, unlike those
+        of a matrix product.
 
     """
+    # Sorted by piece, each is a slice that einsum fills in place.
+    order = np.argsort(index, kind='stable')
+    is_sorted = bool(np.all(order[1:] > order[:-1]))
+    place, index = place[order], index[order]
     left, right = pieces.edges[index], pieces.edges[index + 1]
     powers = np.empty((DEGREE + 1, len(place)))
     np.multiply(place, place, out=powers[0])
     powers[1:] = ((place - left) - (right - place)) / (right - left)
     np.multiply.accumulate(powers, axis=0, out=powers)
-    values = np.empty((len(place), coefficients.shape[2]))
-    for piece, run in _runs(index):
-        values[run] = _sum(powers[:, run], coefficients[piece])
-    return values
+    values = out if is_sorted else np.empty_like(out)
+    ends = np.flatnonzero(np.diff(index, prepend=-1, append=-1))
+    for start, stop in pairwise(ends):
+        _sum(powers[:, start:stop], coefficients[index[start]], out=values[start:stop])
+    if not is_sorted:
+        # `take` copies whole rows, several times as fast as an assignment to `out[order]`.
+        np.take(values, np.argsort(order), axis=0, out=out, mode='clip')
 
 
 def evaluate_one(pieces: Pieces, coefficients: FloatArray, place: float, piece: int) -> FloatArray:
@@ -126,19 +132,10 @@ def evaluate_one(pieces: Pieces, coefficients: FloatArray, place: float, piece: 
     return _sum(powers[:, None], coefficients[piece])
 
 
-def _sum(powers: FloatArray, rows: FloatArray) -> FloatArray:
+def _sum(powers: FloatArray, rows: FloatArray, out: FloatArray | None = None) -> FloatArray:
     """Return the sum of powers (d, n) times rows (d, w), (n, w)."""
     # Not a matrix product: einsum adds term after term for each element, whatever n is.
-    return np.asarray(np.einsum('dn,dw->nw', powers, rows))
-
-
-def _runs(index: IntArray) -> Iterator[tuple[int, IntArray]]:
-    """Yield each piece once, with the places that lie in it."""
-    order = np.argsort(index, kind='stable')
-    ends = np.flatnonzero(np.diff(index[order], prepend=-1, append=-1))
-    for start, stop in pairwise(ends):
-        run = order[start:stop]
-        yield int(index[run[0]]), run
+    return np.asarray(np.einsum('dn,dw->nw', powers, rows, out=out))
 
 
 def refine(

@@ -247,7 +247,7 @@ class Predictor:
             raise self._not_covered(float(speed[index < 0][0]))
         for start in range(0, len(speed), _BLOCK):
             block = slice(start, start + _BLOCK)
-            rows[block] = evaluate(pieces, self.coefficients, speed[block], index[block])
+            evaluate(pieces, self.coefficients, speed[block], index[block], out=rows[block])
         return rows
 
     def _not_covered(self, speed: float) -> OutOfTableError:
