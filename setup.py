@@ -48,6 +48,7 @@ setup(
     extras_require={
         'viewer': ['rerun-sdk>=0.38'],
         'test': [
+            'cyclonedds>=11.0; sys_platform == "linux" and platform_machine == "x86_64"',
             'hypothesis>=6.100',
             'mypy>=1.10',
             'pytest>=8.2',

@@ -56,11 +56,11 @@ class Graph:
         self.executor.add_node(node)
         return node
 
-    def until(self, holds, what='what was awaited'):
+    def until(self, holds, what='what was awaited', deadline_s=DEADLINE_S):
         """Spin until something holds; fail at the deadline."""
-        deadline = time.monotonic() + DEADLINE_S
+        deadline = time.monotonic() + deadline_s
         while not holds():
-            assert time.monotonic() < deadline, f'{what} did not happen in {DEADLINE_S} s'
+            assert time.monotonic() < deadline, f'{what} did not happen in {deadline_s} s'
             self.executor.spin_once(timeout_sec=0.05)
 
     def close(self):
