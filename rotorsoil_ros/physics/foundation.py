@@ -206,8 +206,8 @@ def add_mass(compliance: ComplexArray, mass: FloatArray, omega: FloatArray) -> C
     with np.errstate(divide='ignore', invalid='ignore'):
         found = _SOLVERS.get(compliance.shape[-1], _eliminated)(inertia, compliance)
     if not np.all(np.isfinite(found)):
-        raise NotSolvedError('a mass on its support has no finite receptance: a resonance '
-                             'without damping is hit')
+        raise NotSolvedError('the coupled system has no finite solution: a mass on its support '
+                             'resonates without damping, or nothing holds it')
     return found
 
 

@@ -82,7 +82,7 @@ def test_dofs_that_are_held_take_no_part():
 def test_resonance_without_damping_is_an_error_and_not_a_number(size):
     # k = 4 N/m and m = 1 kg in one direction: resonance at 2 rad/s, to the last bit.
     compliance = np.broadcast_to(0.25 * np.eye(size) + 0j, (2, size, size))
-    with pytest.raises(NotSolvedError, match='resonance without damping'):
+    with pytest.raises(NotSolvedError, match='resonates without damping'):
         add_mass(compliance, np.eye(size), np.array([1.0, 2.0]))
 
 
