@@ -14,6 +14,16 @@ from rotorsoil_ros.physics.infinite import a0_range
 
 GLANCE_S = 0.05
 BAD_INPUT = 2
+SHARES = 4  # for each core: to start a process takes longer than one more table on known soil
+
+# Stops at the first case that fails, and says which, as `rotorsoil tabulate` does.
+WORK = """
+import sys
+from rotorsoil_ros.cli import main
+for case in sys.argv[2:]:
+    if status := main(['tabulate', case, '--cache', sys.argv[1]]):
+        sys.exit(status)
+"""
 
 Tell = Callable[[str], object]
 
@@ -71,28 +81,32 @@ def reload(file: Path, *, cache_directory: Path | None) -> Machine:
 
 def tabulate(files: Sequence[Path], directory: Path, *, tell: Tell) -> None:
     """Compute the tables of cases in parallel processes, which leave them in the cache."""
-    waiting, running, done = list(files), list[tuple[Path, subprocess.Popen[str]]](), 0
+    cores = os.cpu_count() or 1
+    share = max(1, len(files) // (SHARES * cores))
+    waiting = [files[start:start + share] for start in range(0, len(files), share)]
+    running, done = list[tuple[Sequence[Path], subprocess.Popen[str]]](), 0
     try:
         while waiting or running:
-            while waiting and len(running) < (os.cpu_count() or 1):
+            while waiting and len(running) < cores:
                 running.append((waiting[0], _start(waiting.pop(0), directory)))
-            for file, process in list(running):
+            for cases, process in list(running):
                 if _has_ended(process):
-                    running.remove((file, process))
-                    _judge(file, process)
-                    done += 1
+                    running.remove((cases, process))
+                    _judge(cases, process)
+                    done += len(cases)
                     if len(files) > 1:
-                        tell(f'{done} of {len(files)} tables computed: {file}')
+                        tell(f'{done} of {len(files)} tables computed: '
+                             f'{", ".join(map(str, cases))}')
     finally:
         for _, process in running:
             process.kill()
             process.communicate()
 
 
-def _start(file: Path, directory: Path) -> 'subprocess.Popen[str]':
+def _start(files: Sequence[Path], directory: Path) -> 'subprocess.Popen[str]':
     return subprocess.Popen(
-        [sys.executable, '-m', 'rotorsoil_ros.cli', 'tabulate', str(file), '--cache',
-         str(directory)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        [sys.executable, '-c', WORK, str(directory), *map(str, files)],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
         env={**os.environ, 'OMP_NUM_THREADS': '1'})
 
 
@@ -104,13 +118,15 @@ def _has_ended(process: 'subprocess.Popen[str]') -> bool:
     return True
 
 
-def _judge(file: Path, process: 'subprocess.Popen[str]') -> None:
+def _judge(files: Sequence[Path], process: 'subprocess.Popen[str]') -> None:
     """Raise InputError with what the process said if it failed."""
     _, said = process.communicate()
+    if not process.returncode:
+        return
+    named = ', '.join(map(str, files))
     if process.returncode == BAD_INPUT:
-        raise InputError(said.strip().splitlines()[-1] if said.strip() else f'{file}: failed')
-    if process.returncode:
-        raise InputError(f'{file}: its table was not computed (status {process.returncode})')
+        raise InputError(said.strip().splitlines()[-1] if said.strip() else f'{named}: failed')
+    raise InputError(f'{named}: not computed (status {process.returncode})')
 
 
 def _is_tabulated(case: config.Case, directory: Path) -> bool:

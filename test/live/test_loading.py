@@ -62,3 +62,17 @@ def test_what_a_process_complains_of_is_the_complaint(cases, tmp_path):
     with pytest.raises(InputError, match=r'bad\.yaml: name'):
         load_all([good, bad], cache_directory=tmp_path / 'c', tell=told.append)
     assert not Path(tmp_path / 'c').exists()
+
+
+def test_many_tables_share_a_process_and_the_case_that_fails_is_named(
+        cases, tmp_path, monkeypatch):
+    monkeypatch.setattr(loading, 'SHARES', 1)
+    monkeypatch.setattr(loading.os, 'cpu_count', lambda: 1)
+    files = [cases(f'machine_{mass}', ('mass: 42.0', f'mass: {mass}.0')) for mass in (41, 43)]
+    told = []
+    loading.tabulate(files, tmp_path / 'c', tell=told.append)
+    assert told == [f'2 of 2 tables computed: {files[0]}, {files[1]}']
+    assert len(list((tmp_path / 'c').iterdir())) == 2
+    wrong = cases('wrong', ('mass: 42.0', 'mass: -42.0'))
+    with pytest.raises(InputError, match=r'wrong\.yaml: foundations'):
+        loading.tabulate([files[0], wrong], tmp_path / 'c', tell=told.append)
