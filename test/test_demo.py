@@ -61,7 +61,9 @@ def test_comparison_without_a_plant_finds_what_was_put_in(tmp_path, monkeypatch,
     assert last[1] == pytest.approx(last[0], rel=0.03)
     assert 0.028 < first[0] < last[0] < 7.0 * 0.028  # the fan's, and growing by six times that
     assert re.search(r'verdict   fails: .*peak measured at 1[01]\d\d rpm .* 13\d\d rpm', said)
-    assert 'SYNTHETIC' in (out / 'report.html').read_text()
+    report = (out / 'report.html').read_text()
+    assert 'SYNTHETIC' in report
+    assert 'class="zone-A">A<' in report
     assert 'soil.shear_modulus: factor' in (out / 'comparison.txt').read_text()
     assert (out / 'synthetic_plant_fan.mcap').stat().st_size > 100_000
     if find_spec('rerun'):

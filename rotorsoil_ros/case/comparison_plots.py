@@ -153,7 +153,7 @@ def _wrapped(phase: FloatArray) -> FloatArray:
 
 def polar(points: ChannelPoints, title: str) -> Figure:
     """Draw the vectors of a channel, predicted as a line, measured as dots."""
-    figure = Figure(figsize=(5.6, 5.6), layout='constrained')
+    figure = Figure(figsize=(7.5, 5.4), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
     given = np.isfinite(points.predicted)
     order = np.argsort(points.speed[given], kind='stable')
@@ -168,7 +168,7 @@ def polar(points: ChannelPoints, title: str) -> Figure:
               else 'predicted (its larger vectors are off the scale)')
     axes.set_ylim(0.0, largest)
     axes.tick_params(labelsize=7)
-    axes.legend(fontsize=7, loc='upper center', bbox_to_anchor=(0.5, -0.05))
+    axes.legend(fontsize=7, loc='upper left', bbox_to_anchor=(1.02, 1.0))
     axes.set_title(f'{title}: {points.channel}, 1X [{_unit(points.channel)}, zero-to-peak]',
                    fontsize=9)
     return figure

@@ -23,9 +23,16 @@ h1 { font-size: 1.4rem; } h2 { font-size: 1.1rem; margin-top: 1.6rem; }
 table { border-collapse: collapse; margin: .4rem 0; }
 th, td { border: 1px solid #ccc; padding: .15rem .5rem; text-align: right; font-size: 12px; }
 th, td:first-child { text-align: left; background: #f5f5f5; }
-figure { display: inline-block; margin: .4rem; vertical-align: top; max-width: 100%; }
-figure img { max-width: 100%; width: 29rem; } figcaption { font-size: 12px; color: #555; }
+td.zone-A { background: #cdebd8; } td.zone-B { background: #e8f0c4; }
+td.zone-C { background: #fbe3b3; } td.zone-D { background: #f5c1bb; }
+pre { white-space: pre-wrap; font-size: 12px; background: #f5f5f5; padding: .5rem .8rem; }
+.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(24rem, 1fr));
+            gap: 1rem; align-items: start; }
+figure { margin: 0; break-inside: avoid; } figure img { width: 100%; }
+figcaption { font-size: 12px; color: #555; }
 """
+
+ZONES = ('A', 'B', 'C', 'D')
 
 _WORDS = {
     Verdict.PASSES: 'The machine behaves as predicted.',
@@ -66,7 +73,7 @@ def page(
     if comparison.remarks:
         parts.append(f'<h2>To be known</h2>{_list(comparison.remarks)}')
     parts += ['<h2>Channels</h2>', _table(*channel_table(comparison))]
-    parts += [f'<p>{escape(line)}</p>' for line in exclusions(comparison)]
+    parts.append(_list(exclusions(comparison)))
     if comparison.peaks:
         parts += ['<h2>Peaks</h2>', _table(*peak_table(comparison))]
     if comparison.expectation and comparison.expectation.criticals:
@@ -81,11 +88,12 @@ def page(
     if identification:
         text = escape('\n'.join(identification))
         parts += ['<h2>Identification</h2>', f'<pre>{text}</pre>']
-    parts.append('<h2>Pictures</h2>')
+    parts.append('<h2>Pictures</h2><div class="pictures">')
     for caption, png in pictures:
         image = base64.b64encode(png).decode()
         parts.append(f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{image}">'
                      f'<figcaption>{escape(caption)}</figcaption></figure>')
+    parts.append('</div>')
     return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>'
             f'{escape(title)}</title><style>{_STYLE}</style></head><body>\n'
             + '\n'.join(parts) + '\n</body></html>\n')
@@ -156,7 +164,11 @@ def _list(lines: Sequence[str]) -> str:
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    def row(cells: Sequence[str], tag: str) -> str:
-        return f'<tr>{"".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells)}</tr>'
+    head = ''.join(f'<th>{escape(cell)}</th>' for cell in header)
+    body = ''.join(f'<tr>{"".join(map(_cell, cells))}</tr>' for cells in rows)
+    return f'<table><tr>{head}</tr>{body}</table>'
 
-    return f'<table>{row(header, "th")}{"".join(row(cells, "td") for cells in rows)}</table>'
+
+def _cell(text: str) -> str:
+    kind = f' class="zone-{text}"' if text in ZONES else ''
+    return f'<td{kind}>{escape(text)}</td>'

@@ -30,7 +30,7 @@ from rotorsoil_ros.live.zone_lane import ZoneLane
 ORDER = (PROBES, HOUSINGS, DISCS, JOURNALS, BLOCK, ROCKING)
 ORDER_OF_AMPLITUDES = (PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING)
 DIRECTIONS = {'x': 'horizontal', 'z': 'vertical'}
-FROM = (1.1, -0.7, 0.55)  # where the eye is, in extents of the machine
+FROM = (1.15, -0.72, 0.58)  # where the eye is, in extents of the machine
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,13 +139,14 @@ def _picture_column(shown: Shown) -> rrb.Vertical:
 
 def _machine(shown: Shown) -> rrb.Vertical:
     scene, picture = shown.scene, shown.entity('picture')
-    target = np.array([0.0, 0.5 * scene.length, 0.42 * scene.shaft_height])
+    target = np.array([0.0, 0.5 * scene.length, 0.36 * scene.shaft_height])
     eye = rrb.EyeControls3D(
         position=target + scene.extent * np.array(FROM), look_target=target,
         eye_up=(0.0, 0.0, 1.0))
     return rrb.Vertical(
         rrb.Spatial3DView(
-            name=f'{shown.name}: rotor on its foundation', origin=picture, contents=f'{picture}/**',
+            name=f'{shown.name}: rotor on its foundation', origin=picture,
+            contents=f'{picture}/**',
             line_grid=rrb.LineGrid3D(visible=True, spacing=0.1 * scene.extent),
             eye_controls=eye),
         rrb.TextDocumentView(name='What is drawn', origin=shown.entity('caption')),

@@ -22,6 +22,7 @@ WIDTH, AMPLITUDE, PHASE = 230.0, (60.0, 0.0), (108.0, 78.0)
 BOUNDS = rrb.VisualBounds2D(x_range=(-30.0, WIDTH + 28.0), y_range=(-8.0, 128.0))
 DECADES = 4
 HEADROOM = 10.0  # above the largest prediction, for what is measured
+LIFT = 8.0  # of a word beside its tick: it hangs below its place
 TRAIL = 400  # measured points that stay
 RESOLUTION = 400  # of speed: a point closer to the last one replaces nothing
 TRAIL_NS = 2 * NANOSECONDS
@@ -125,15 +126,15 @@ class Bode:
         lines += grid(speed, phase, x_ticks=rpm, y_ticks=(-90.0, *angles, 90.0))
         labels = [Label(f'{tick:g}', float(speed.place(np.array(tick))), bottom + 3.0)
                   for tick in rpm]
-        labels += [Label(f'{tick:g}', -14.0, float(amplitude.place(np.array(tick))) - 3.0)
+        labels += [Label(f'{tick:g}', -14.0, float(amplitude.place(np.array(tick))) - LIFT)
                    for tick in sizes]
-        labels += [Label(f'{tick:g}', -14.0, float(phase.place(np.array(tick))) - 3.0)
+        labels += [Label(f'{tick:g}', -14.0, float(phase.place(np.array(tick))) - LIFT)
                    for tick in angles]
         labels += [Label('rpm', WIDTH + 14.0, bottom + 3.0)]
         self._recording.still(f'{path}/grid', drawn_grid(lines))
         self._recording.still(f'{path}/labels', written(labels))
         self._recording.still(f'{path}/legend', rr.Points2D(
-            [(0.72 * WIDTH, 45.0), (0.9 * WIDTH, 45.0)], radii=0.0, show_labels=True,
+            [(0.65 * WIDTH, 44.0), (0.89 * WIDTH, 44.0)], radii=0.0, show_labels=True,
             colors=[PREDICTED, MEASURED], labels=['predicted', 'measured']))
         self._recording.still(f'{path}/measured', rr.Points2D.from_fields(
             colors=MEASURED, radii=rr.Radius.ui_points(1.5), draw_order=10.0))

@@ -135,6 +135,16 @@ class Orbits:
                 self._cells, pairs, strict=True) if cell.radii])
         self._draw('predicted', stamp_ns[rows], strips, has_phase=True)
 
+    def expect(self, events: Sequence[Compared]) -> None:
+        """Learn how large what was measured is, before a scale is chosen for it."""
+        for cell in self._cells:
+            names = {self._channels[column] for column in cell.columns}
+            sizes = [float(np.nanmax(event.amplitude[:, column], initial=0.0))
+                     for event in events for column, name in enumerate(event.channels)
+                     if name in names]
+            if sizes:
+                cell.measured = MICRO * max(sizes)
+
     def compare(self, events: Sequence[Compared]) -> None:
         """Draw measured orbits of all stations of which both directions were measured."""
         tracks = {channel: Track.of(events, channel) for channel in self._channels
@@ -157,7 +167,6 @@ class Orbits:
             if not np.isfinite(size).all():
                 strips.append([])
                 continue
-            cell.measured = MICRO * float(size.max())
             angle = np.array([x.phase[row], z.phase[other]])
             has_phase = bool(np.isfinite(angle).all())
             strips.append([cell.path(size * np.exp(1j * angle), radius) if has_phase

@@ -151,6 +151,7 @@ class MachineView:
     def flush(self) -> None:
         """Send what was collected."""
         self._look_for_criteria()
+        self._orbits.expect(self._compared)
         if self._predicted:
             self._send_predicted(self._predicted)
         if self._compared:

@@ -93,7 +93,7 @@ class Waterfall:
         labels = [Label(f'{tick:g}', float(self._frequency.place(np.array(tick))), ROWS + 1.0)
                   for tick in ticks]
         labels += [Label(f'{tick:g} s ago' if tick else 'now', -7.0,
-                         float(rows.place(np.array(tick))) - 1.5) for tick in ago]
+                         float(rows.place(np.array(tick))) - 3.0) for tick in ago]
         labels.append(Label(
             f'velocity from {QUIETEST:g} (dark) to {LOUDEST:g} mm/s rms (bright) over frequency '
             '[Hz]; line: speed', 0.5 * COLUMNS, -6.0))

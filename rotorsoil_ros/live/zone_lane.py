@@ -1,7 +1,5 @@
 """In which zone was every housing, and since when? A lane for each, predicted and measured."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -10,7 +8,9 @@ from rotorsoil_ros.live.events import Zoned
 from rotorsoil_ros.live.recording import Recording
 
 MEASURED, PREDICTED = 'measured', 'predicted'
-COLOURS = {'A': (40, 150, 75), 'B': (140, 190, 70), 'C': (225, 160, 30), 'D': (205, 55, 50)}
+UNKNOWN = '-'
+COLOURS = {'A': (40, 150, 75), 'B': (140, 190, 70), 'C': (225, 160, 30), 'D': (205, 55, 50),
+           UNKNOWN: (70, 70, 70)}
 
 
 class ZoneLane:
@@ -31,20 +31,20 @@ class ZoneLane:
 
     def draw(self, event: Zoned, stamp_ns: int) -> None:
         """Draw what has changed."""
-        self._lanes(PREDICTED, event.predicted, stamp_ns)
-        self._lanes(MEASURED, event.measured, stamp_ns)
+        # A lane that says that nothing is measured is more than an empty view.
+        channels = {*event.predicted, *event.measured, *(channel for channel, _ in self._told)}
+        for channel in sorted(channels):
+            for source, zones in ((PREDICTED, event.predicted), (MEASURED, event.measured)):
+                self._tell(channel, source, zones.get(channel) or UNKNOWN, stamp_ns)
 
-    def _lanes(self, source: str, zones: Mapping[str, str], stamp_ns: int) -> None:
-        known = {channel for channel, of_source in self._told if of_source == source}
-        for channel in sorted(known | set(zones)):
-            zone = zones.get(channel, '')
-            if self._told.get((channel, source), '') == zone:
-                continue
-            lane = f'{self._entity}/{source}/{channel}'
-            if (channel, source) not in self._told:
-                self._recording.still(lane, rr.StateConfiguration(
-                    values=list(COLOURS), labels=list(COLOURS),
-                    colors=list(COLOURS.values())))
-            self._told[channel, source] = zone
-            self._recording.send(lane, np.array([stamp_ns]),
-                                 rr.StateChange.columns(state=[zone]))
+    def _tell(self, channel: str, source: str, zone: str, stamp_ns: int) -> None:
+        before = self._told.get((channel, source))
+        if zone == before:
+            return
+        self._told[channel, source] = zone
+        lane = f'{self._entity}/{source}/{channel}'
+        if before is None:
+            self._recording.still(lane, rr.StateConfiguration(
+                values=list(COLOURS), labels=[*list(COLOURS)[:-1], f'not {source}'],
+                colors=list(COLOURS.values())))
+        self._recording.send(lane, np.array([stamp_ns]), rr.StateChange.columns(state=[zone]))

@@ -167,6 +167,17 @@ def test_the_written_scale_is_the_radius_of_the_circle(paper, machine, orbits):
     assert 0.3 <= 0.5 * max(np.ptp(line, axis=0)) <= 0.95
 
 
+def test_a_circle_holds_what_is_measured_as_well(paper, machine, orbits):
+    large = [measured('disc_1_x', 1e-3, 0.0), measured('disc_1_z', 1e-3, 1.5)]
+    orbits.expect(large)
+    orbits.predicted(np.array([START]), vectors(machine))
+    orbits.compare(large)
+    [[found]] = paper.drawn['orbits/measured/disc_1', 'strips']
+    row = paper.drawn['orbits/names', 'Points2D:labels'].index('disc_1')
+    assert paper.drawn['orbits/scales', 'Points2D:labels'][0][row] == 'circle: 2000 um'
+    assert np.ptp(found[:, 0]) == pytest.approx(2.0 * 0.5, rel=5e-3)  # 1 mm of 2 mm
+
+
 def test_without_phases_a_box_says_how_far_it_moves(paper, machine, orbits):
     orbits.predicted(np.array([START]), vectors(machine))
     orbits.compare([measured('disc_1_x', 1e-6, np.nan), measured('disc_1_z', 1e-6, np.nan)])

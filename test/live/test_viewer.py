@@ -166,7 +166,7 @@ def test_limits_of_zones_follow_the_class_of_the_support(recorded, machine, judg
     assert found['x'] == [[pytest.approx(rigid)], [pytest.approx(rigid)]]
 
 
-def test_a_lane_shows_when_a_zone_changed_and_nothing_when_it_is_not_known(recorded, machine):
+def test_a_lane_shows_when_a_zone_changed_and_that_nothing_is_measured(recorded, machine):
     path = recorded(
         predicted(machine, [300.0]), zoned({'bearing_1_housing_x': 'A'}, {}),
         zoned({'bearing_1_housing_x': 'A'}, {'bearing_1_housing_x': 'D'}),
@@ -176,7 +176,9 @@ def test_a_lane_shows_when_a_zone_changed_and_nothing_when_it_is_not_known(recor
     assert column(path, lane.format('predicted'), 'StateChange:state') == (
         [START, START + 10**9], [['A'], ['B']])
     assert column(path, lane.format('measured'), 'StateChange:state') == (
-        [START, START + 10**9], [['D'], ['']])
+        [START, START, START + 10**9], [['-'], ['D'], ['-']])
+    _, words = column(path, lane.format('measured'), 'StateConfiguration:labels', static=True)
+    assert words == [['A', 'B', 'C', 'D', 'not measured']]
 
 
 def test_remarks_stand_in_the_list_of_events_at_their_data(recorded, machine):
