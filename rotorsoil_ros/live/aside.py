@@ -1,6 +1,6 @@
 """What is slow or may hang works aside, so that no answer waits for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import queue
 import sys
 import threading
@@ -57,10 +57,10 @@ class Aside(Generic[Item]):
         self._is_behind = self._is_behind and self._batches.qsize() > 1
         return True
 
-    def close(self) -> None:
-        """Finish, if that takes no longer than anybody would wait."""
+    def close(self, last: Sequence[Item] = ()) -> None:
+        """Finish with a last batch, if that takes no longer than anybody would wait."""
         patience_s = 0.0 if self.has_failed else self._patience_s
-        taken = self.put(self._items, wait_s=patience_s)
+        taken = self.put([*self._items, *last], wait_s=patience_s)
         try:
             self._batches.put(None, block=taken, timeout=patience_s)
         except queue.Full:

@@ -61,8 +61,7 @@ class BagAside:
 
     def close(self) -> None:
         """Finish the bag, if the disk lets it."""
-        self.flush(wait_s=PATIENCE_S)
-        self._aside.close()
+        self._aside.close([self._missed, *self._waiting] if self._missed else self._waiting)
 
     def report(self, now_ns: int) -> Diagnostics:
         """Tell how logging went when it was last handed over."""
