@@ -35,6 +35,8 @@ from rotorsoil_ros.physics.quasistatic import is_quasi_static
 from rotorsoil_ros.physics.response import Predictor
 
 MOST_NAMES = 16
+REPEAT_NS = NANOSECONDS  # after which a band is told again although the speed has not moved
+MOVED = 1e-3  # share of a speed
 WINDOW_NS = 5 * NANOSECONDS  # of speeds from which their rate is told
 
 
@@ -50,7 +52,7 @@ class Judging:
     turns : float
         Turns of the rotor that make one vector of raw samples.
     band_period_s : float
-        Message time between two bands; 0 for one with every speed [s].
+        Message time between two bands while the speed changes; 0: one with every speed [s].
 
     """
 
@@ -88,8 +90,8 @@ class Judge:
         self._compared: list[Compared] = []
         self._unknown: set[str] = set()
         self._told: set[str] = set()
-        self._band_ns = max(1, round(judging.band_period_s * NANOSECONDS))
-        self._band_period = -1
+        self._band_ns = round(judging.band_period_s * NANOSECONDS)
+        self._band_told = -REPEAT_NS, 0.0
 
     def take_predictor(self, predictor: Predictor, *, is_same_machine: bool) -> None:
         """Judge by another unbalance, for which the band is not known yet, or another case."""
@@ -104,19 +106,17 @@ class Judge:
     def on_speed(self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> bool:
         """Note speeds [rad/s] and rotor angles [rad]; return whether `follow` has something."""
         self.history.add(stamp_ns, speed, angle)
-        return not self._pairing.is_idle or (
-            self._criteria is not None
-            and int(stamp_ns[-1]) // self._band_ns != self._band_period)
+        return (len(speed) > 1 or not self._pairing.is_idle
+                or (self._criteria is not None
+                    and self._is_band_due(int(stamp_ns[0]), float(speed[0]))))
 
     def follow(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[Event]:
         """Yield the band of these speeds, and the comparisons that waited for them."""
         if self._criteria is not None and self._criteria.envelope is not None:
-            period = stamp_ns // self._band_ns
-            rows = np.flatnonzero(np.diff(period, prepend=self._band_period))
-            if len(rows):
+            rows = list(self._band_rows(stamp_ns, speed))
+            if rows:
                 band = self._criteria.envelope.at(speed[rows])
                 yield Band(self.machine, stamp_ns[rows], speed[rows], band.low, band.high)
-        self._band_period = int(stamp_ns[-1]) // self._band_ns
         yield from self._matched()
 
     def on_measured(self, measured: Measured) -> Iterator[Event]:
@@ -155,6 +155,23 @@ class Judge:
         """Judge the passage that the end of the run has cut short."""
         if self._criteria is not None:
             yield from self._passing.cut_short(now_ns, self._criteria.resonances)
+
+    def _band_rows(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[int]:
+        """Yield the rows with which a band is due."""
+        for row, (stamp, value) in enumerate(
+                zip(stamp_ns.tolist(), speed.tolist(), strict=True)):
+            if self._is_band_due(stamp, value):
+                self._band_told = stamp, value
+                yield row
+
+    def _is_band_due(self, stamp: int, speed: float) -> bool:
+        """Return whether time and speed have moved on since the last band; at rest each second."""
+        told_ns, told_speed = self._band_told
+        since = stamp - told_ns
+        if 0 <= since < self._band_ns:
+            return False
+        return (not 0 <= since < REPEAT_NS or not self._band_ns
+                or abs(speed - told_speed) > MOVED * told_speed)
 
     def _matched(self, *, is_tick: bool = False) -> Iterator[Compared]:
         """Yield what has found its speed."""

@@ -134,8 +134,8 @@ OWN = {
         Judging().turns, 'Turns of the rotor that make one vector of raw samples', 'turns',
         span=(2.0, 1000.0)),
     'band_period_s': quantity(
-        Judging().band_period_s, 'Message time between two bands, zero: one with every speed',
-        's', span=(0.0, 3600.0)),
+        Judging().band_period_s, 'Message time between two bands while the speed changes (else '
+        'a second), zero: one with every speed', 's', span=(0.0, 3600.0)),
     'log.directory': Setting('', 'Directory for logs; empty: no logs.'),
     'log.name': Setting(
         'run', 'Name of the log; where it is taken, name_2, name_3...',

@@ -205,6 +205,15 @@ def test_band_comes_with_every_tenth_of_a_second_and_is_that_of_the_soils(fan, b
         bands[3].high[0, column])
 
 
+def test_band_at_constant_speed_is_told_once_a_second(run):
+    for number in range(300):
+        run.turns(1.0 + 0.01 * number, RUNNING * (1.0 + 1e-4 * (number % 3)))
+    assert [event.stamp_ns[0] for event in run.of(Band)] == [SECOND, 2 * SECOND, 3 * SECOND]
+    run.turns(4.5, RUNNING)
+    run.turns(1.0, RUNNING)  # time jumps back
+    assert run.of(Band)[-1].stamp_ns[0] == SECOND
+
+
 def test_band_is_forgotten_when_the_unbalance_changes(fan, basis):
     run = Run(fan, basis, band_period_s=0.0)
     run.turns(1.0, RUNNING)
