@@ -271,6 +271,8 @@ def _failures(comparison: Comparison) -> list[str]:
 
 def _remarks(comparison: Comparison) -> list[str]:
     found = []
+    if comparison.expectation is not None and comparison.expectation.note:
+        found.append(comparison.expectation.note)
     if comparison.expectation is not None and comparison.expectation.band is None:
         found.append('no band on this support: of the amplitudes only peaks are judged')
     for channel in comparison.points:

@@ -13,6 +13,7 @@ from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.band import Envelope, ResponseBand, SoilSpread
 from rotorsoil_ros.physics.comparison import Reference
 from rotorsoil_ros.physics.coupled import CoupledModel
+from rotorsoil_ros.physics.errors import NotSolvedError
 from rotorsoil_ros.physics.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.physics.quasistatic import Resonance
 from rotorsoil_ros.physics.response import Predictor, ResponseTable
@@ -49,6 +50,8 @@ class Expectation:
         Its response on other soils; None on a support that knows of no soil.
     spread : SoilSpread
         How far those are from the one of the case.
+    note : str
+        What could not be found, and why; empty if everything was.
 
     """
 
@@ -58,6 +61,7 @@ class Expectation:
     modes: tuple[CriticalSpeed, ...]
     band: ResponseBand | None
     spread: SoilSpread
+    note: str = ''
 
     @classmethod
     def of(
@@ -73,8 +77,12 @@ class Expectation:
             soils = spread.soils(
                 case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
             band = ResponseBand.build(table, on_soils(model, soils[1:]))
-        modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
-        return cls(case, model, table, modes, band, spread)
+        note = ''
+        try:
+            modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
+        except NotSolvedError as error:
+            modes, note = (), f'critical speeds of the model are not known: {error}'
+        return cls(case, model, table, modes, band, spread, note)
 
     @property
     def criticals(self) -> tuple[CriticalSpeed, ...]:

@@ -67,3 +67,21 @@ def test_band_of_infinite_elements_solves_no_soil(tmp_path, monkeypatch):
     found = Expectation.of(case, tmp_path, FEW)
     assert found.band is not None
     assert len(found.band.tables) == 5
+
+
+def test_comparison_goes_on_where_a_table_does_not_determine_the_modes(tmp_path):
+    dofs, stiffness = ('xx', 'yy', 'zz', 'rxrx', 'ryry', 'rzrz'), np.array(
+        [1.2e8, 1.2e8, 1.4e8, 3e7, 3e7, 5e7])
+    rows = ['omega_rad_s,' + ','.join(f'{dof}_re,{dof}_im' for dof in dofs)]
+    for number, omega in enumerate(np.linspace(6.0, 1000.0, 30)):
+        jumping = (1.0 + 0.3 * (-1.0) ** number) * stiffness
+        rows.append(f'{omega},' + ','.join(f'{each},{0.15 * each}' for each in jumping))
+    (tmp_path / 'jumping.csv').write_text('\n'.join(rows) + '\n')
+    case = load(CASES / 'paper_rotor.yaml', [
+        'support={model: table, file: ' + str(tmp_path / 'jumping.csv') + '}',
+        'foundations.0.mass=4200'])
+    found = Expectation.of(case, tmp_path)
+    assert found.modes == ()
+    assert 'critical speeds of the model are not known' in found.note
+    prediction = found.reference(np.array([0]), np.array([300.0]), [(0, case.unbalance)])
+    assert np.isfinite(prediction.displacement[0]).any()
