@@ -36,7 +36,7 @@ def machine_drawing(case: Case) -> Figure:
     # Room for the labels of discs above, and of bearings to the right.
     depth = 0.1 * top
     across, up = right - left + 2.0 * reach, top + depth
-    figure = Figure(figsize=(7.5, min(max(1.5 + 6.2 * up / across, 2.6), 7.0)),
+    figure = Figure(figsize=(7.5, min(max(1.9 + 6.2 * up / across, 2.9), 7.4)),
                     layout='constrained')
     # Widths in the ratio of the limits: then both views have one scale.
     side, end = figure.subplots(1, 2, width_ratios=[right - left, 2.0 * reach], sharey=True)

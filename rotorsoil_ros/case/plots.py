@@ -150,7 +150,7 @@ def title_of(critical: CriticalSpeed) -> str:
     return (f'critical speed {rad_s_to_rpm(critical.speed):.0f} rpm, '
             f'{"forward" if critical.whirl > 0 else "backward"}, damping ratio '
             f'{critical.damping_ratio:.2g}, amplification factor '
-            f'{critical.amplification_factor:.4g}')
+            f'{critical.amplification_factor:.3g}')
 
 
 def drawn_criticals(
