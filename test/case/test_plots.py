@@ -126,7 +126,7 @@ def test_orbits_and_shapes_are_those_at_the_critical_speeds(on_pedestal):
         title = (f'critical speed {rad_s_to_rpm(critical.speed):.0f} rpm, '
                  f'{"forward" if critical.whirl > 0 else "backward"}, damping ratio '
                  f'{critical.damping_ratio:.2g}, amplification factor '
-                 f'{critical.amplification_factor:.4g}')
+                 f'{critical.amplification_factor:.3g}')
         assert row.get_suptitle() == shape.get_title() == title
         exact = model.unbalance_response(np.array([critical.speed]), case.unbalance)
         x, z = (exact.displacement[0, model.channels.index(f'wheel_{axis}')] for axis in 'xz')
