@@ -99,7 +99,7 @@ class MachineView:
         self._recording = recording
         self._machine = machine
         self._shown = shown
-        self._unbalance: ComplexArray = machine.case.unbalance
+        self._unbalance: ComplexArray | None = machine.case.unbalance
         self._criteria: Criteria | None = None
         self._predicted: list[Predicted] = []
         self._compared: list[Compared] = []
@@ -110,7 +110,7 @@ class MachineView:
         self._speed = np.nan
         self._trends = TrendLines(recording, shown.name, shown.trends)
         self._bode = Bode(recording, shown.entity('bode'), shown.trends,
-                          machine.table.predictor(self._unbalance))
+                          machine.table.predictor(machine.case.unbalance))
         self._orbits = Orbits(recording, shown.entity('orbits'), shown.case,
                               machine.table.channels)
         self._zones = ZoneLane(recording, shown.entity('zones'))
@@ -202,21 +202,20 @@ class MachineView:
         tables = event.description.get('tables')
         if not isinstance(told, dict) or not isinstance(tables, dict):
             return
-        if tables.get('response') != table.key:
-            self._bode.predict(None)  # of another case nothing is known here
-            self._bode.band(None)
-            return
-        unbalance = np.array([
-            told[plane]['moment_kg_m'] * np.exp(1j * told[plane]['phase_rad'])
-            for plane in table.planes])
-        if not np.allclose(unbalance, self._unbalance):
+        unbalance: ComplexArray | None = None
+        if tables.get('response') == table.key:  # of another case nothing is known here
+            unbalance = np.array([
+                told[plane]['moment_kg_m'] * np.exp(1j * told[plane]['phase_rad'])
+                for plane in table.planes])
+        if unbalance is None or self._unbalance is None or not np.allclose(
+                unbalance, self._unbalance, rtol=1e-9, atol=0.0):
             self._unbalance, self._criteria = unbalance, None
-            self._bode.predict(table.predictor(unbalance))
+            self._bode.predict(None if unbalance is None else table.predictor(unbalance))
             self._bode.band(None)
 
     def _look_for_criteria(self) -> None:
         """Read band and supports once somebody has computed them; then there are zones."""
-        if self._criteria is None and any(
+        if self._criteria is None and self._unbalance is not None and any(
                 isinstance(event, Zoned) and event.predicted for event, _ in self._moments):
             self._criteria = stored_criteria(
                 self._machine.case, self._machine.model, self._unbalance,

@@ -7,7 +7,7 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
-from rotorsoil_ros.live.events import Compared, Model, Samples
+from rotorsoil_ros.live.events import Compared, Model, Predicted, Samples
 
 rr = pytest.importorskip('rerun', reason='rerun-sdk is optional')
 
@@ -99,6 +99,15 @@ def test_a_measured_point_that_is_predicted_lies_on_the_line(paper, machine, bod
     assert points[0, 1] - points[1, 1] == pytest.approx(15.0 * np.log10(2.0), rel=1e-5)
 
 
+def test_a_phase_ahead_lies_above_one_behind(paper, bode):
+    heights = []
+    for second, phase in enumerate((0.5 * np.pi, -0.5 * np.pi)):
+        bode.compare(measured('disc_1_x', 1e-6 * 10.0**second, phase,
+                              stamp_ns=START + 10 * second * SECOND))
+        heights.append(paper.drawn['bode/disc_1_x/measured', 'Points2D:positions'][0][-1][1])
+    assert heights[1] - heights[0] == pytest.approx(15.0)  # half of its axis, downward
+
+
 def test_at_a_steady_state_no_points_are_piled_up(paper, bode):
     for second in range(5):
         bode.compare(measured('disc_1_x', 1e-6, 0.0, stamp_ns=START + 10 * second * SECOND))
@@ -122,9 +131,13 @@ def test_another_unbalance_moves_the_curve_and_another_case_removes_it(paper, ma
     assert inside.any()
     decade = (heights[1] - heights[0])[inside]
     np.testing.assert_allclose(decade, 15.0, atol=0.01)  # downward
+    after = paper.drawn[entity]
     view.take(Model('fan', START, {**description, 'tables': {'response': 'another'}}))
     view.flush()
     assert paper.drawn[entity] == []
+    view.take(Model('fan', START, description))
+    view.flush()
+    assert paper.drawn[entity] == after
 
 
 @pytest.fixture
@@ -178,6 +191,16 @@ def test_a_circle_holds_what_is_measured_as_well(paper, machine, orbits):
     assert np.ptp(found[:, 0]) == pytest.approx(2.0 * 0.5, rel=5e-3)  # 1 mm of 2 mm
 
 
+def test_what_comes_with_a_measurement_is_drawn_at_its_scale(paper, machine):
+    view = MachineView(paper, shown(machine), machine)
+    prediction = machine.table.predictor(machine.case.unbalance).predict(np.array([300.0]))
+    view.take(Predicted('fan', np.array([START]), prediction))
+    view.take(measured('disc_1_x', 1e-3, 0.0))
+    view.flush()
+    row = paper.drawn['/fan/orbits/names', 'Points2D:labels'].index('disc_1')
+    assert paper.drawn['/fan/orbits/scales', 'Points2D:labels'][0][row] == 'circle: 2000 um'
+
+
 def test_without_phases_a_box_says_how_far_it_moves(paper, machine, orbits):
     orbits.predicted(np.array([START]), vectors(machine))
     orbits.compare([measured('disc_1_x', 1e-6, np.nan), measured('disc_1_z', 1e-6, np.nan)])
@@ -185,6 +208,17 @@ def test_without_phases_a_box_says_how_far_it_moves(paper, machine, orbits):
     assert len(box) == 5
     assert np.ptp(box[:, 0]) == pytest.approx(np.ptp(box[:, 1]))
     assert paper.drawn['orbits/measured/disc_1/mark', 'Points2D:positions'] == [[]]
+
+
+def test_an_orbit_is_seen_along_the_shaft_with_z_upward(paper, machine, orbits):
+    orbits.predicted(np.array([START]), vectors(machine))
+    row = paper.drawn['orbits/names', 'Points2D:labels'].index('disc_1')
+    centre = np.mean(paper.drawn['orbits/predicted', 'strips'][0][row][:-1], axis=0)
+    # At the angle zero it is to the right and above; up is where y of the plane is less.
+    orbits.compare([measured('disc_1_x', 1e-6, 0.0), measured('disc_1_z', 1e-6, 0.0)])
+    [mark] = paper.drawn['orbits/measured/disc_1/mark', 'Points2D:positions']
+    assert mark[0][0] > centre[0]
+    assert mark[0][1] < centre[1]
 
 
 def test_directions_measured_at_other_times_make_no_orbit(paper, machine, orbits):

@@ -1,5 +1,6 @@
 """The drawn machine is the machine: shape, orbits and scale."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -84,3 +85,12 @@ def test_a_scale_is_kept_until_the_picture_would_be_too_large_or_too_small(scene
     largest = np.array([1e-5, 1.4e-5, 0.0, 0.9e-5, 1e-3, 1e-5])
     scales = scene.scales(largest, 1.0)
     assert scales.tolist() == [10000.0, 5000.0, 5000.0, 5000.0, 100.0, 10000.0]
+
+
+def test_a_block_is_as_high_as_its_case_says(machine):
+    [block] = machine.case.foundations
+    case = replace(machine.case, foundations=(replace(block, height=0.3),))
+    [drawn] = Scene(case, machine.table.channels).blocks
+    assert (drawn.height, drawn.is_schematic) == (0.3, False)
+    [unknown] = Scene(machine.case, machine.table.channels).blocks
+    assert unknown.is_schematic

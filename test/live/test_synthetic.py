@@ -1,5 +1,6 @@
 """Synthetic signals are what a recorder would have written, and say that nothing was measured."""
 
+from mcap.reader import NonSeekingReader
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -14,10 +15,15 @@ TRUTH = Truth(shear_modulus_factor=1.0, growth=0.0, noise=0.0, slowest_rpm=900.0
 
 
 @pytest.fixture(scope='module')
-def messages(machine, tmp_path_factory):
+def path(machine, tmp_path_factory):
     path = tmp_path_factory.mktemp('synthetic') / 'run.mcap'
     write_synthetic(path, 'rotor', machine.model, machine.case.unbalance, truth=TRUTH,
                     start_ns=START)
+    return path
+
+
+@pytest.fixture(scope='module')
+def messages(path):
     return [(source.topic, time, bytes(payload))
             for source, time, payload in bag_reader.messages(path, lambda *_: True)]
 
@@ -27,11 +33,13 @@ def samples(messages, channel):
             if topic == f'/rotor/measured/{channel}/imu']
 
 
-def test_the_file_is_in_the_order_of_time_but_for_a_tenth_of_a_second(messages):
-    stamps = np.array([time for _, time, _ in messages])
+def test_the_file_is_in_the_order_of_time_but_for_a_tenth_of_a_second(path):
+    with path.open('rb') as stream:
+        stamps = np.array([message.log_time for _, _, message in NonSeekingReader(
+            stream).iter_messages(log_time_order=False)])
     late = np.maximum.accumulate(stamps) - stamps
-    assert late.max() < 10**8
-    assert {topic.split('/')[2] for topic, _, _ in messages[:400]} == {'joint_states', 'measured'}
+    assert len(stamps) == 4 * 1000 + 63  # four sensors, and the speed
+    assert 0 < late.max() < 10**8
 
 
 def test_every_sample_is_there_once_and_labelled(messages):
