@@ -159,7 +159,9 @@ def opened(file: Path) -> Iterator[BinaryIO]:
         # A place that no file has comes from an index that somebody damaged.
         said = 'is damaged' if error.errno == errno.EINVAL else error.strerror
         raise InputError(f'{file}: {said}') from error
-    except BROKEN as error:
+    except InputError:
+        raise
+    except (*BROKEN, ValueError) as error:  # the library lets places of damaged indexes through
         raise InputError(f'{file}: is damaged ({error or type(error).__name__})') from error
 
 

@@ -149,7 +149,7 @@ class Judge:
         yield from self._verdict.tell(
             now_ns, stale_after_s=stale_after_s, has_data=bool(compared),
             has_phase=any(np.isfinite(each.phase).any() for each in compared),
-            is_steady=self.history.is_steady(), counts=self._counts())
+            is_steady=self.history.is_steady, counts=self._counts())
 
     def finish(self, now_ns: int) -> Iterator[Event]:
         """Judge the passage that the end of the run has cut short."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 import gc
 import signal
+import sys
 import traceback
 from types import FrameType, TracebackType
 from typing import Any
@@ -43,6 +44,7 @@ from rotorsoil_ros.physics.errors import InputError, RotorSoilError
 
 PERIOD_S = 1.0
 SPIN_S = 0.1  # EventsExecutor dispatches nothing without a timeout; signals wait for it
+SWITCH_S = 5e-4  # that an answer may wait for the thread that writes the log
 BAD_INPUT = 2
 EXECUTORS = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
 
@@ -254,6 +256,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with stop.interrupting():
                 if node.settings.value('autostart') and not node.start():
                     return BAD_INPUT
+            sys.setswitchinterval(SWITCH_S)
             gc.freeze()  # tables and classes stay: looking for garbage among them costs latency
             while not stop.requested and node.context.ok():
                 # Returns after SPIN_S; `spin_once` would return to Python after every message.

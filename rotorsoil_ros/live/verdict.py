@@ -1,6 +1,6 @@
 """What is to be said of a machine's vibration: a level and a sentence, and when they change."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from rotorsoil_ros.live.events import Diagnostics, Event, Level, NANOSECONDS, Remark, Zoned
 from rotorsoil_ros.live.passing import Passing
@@ -21,7 +21,7 @@ class Verdict:
 
     def tell(
         self, now_ns: int, *, stale_after_s: float, has_data: bool, has_phase: bool,
-        is_steady: bool, counts: Mapping[str, float],
+        is_steady: Callable[[], bool], counts: Mapping[str, float],
     ) -> Iterator[Event]:
         """
         Yield zones, remarks and the diagnostics of a period.
@@ -32,8 +32,8 @@ class Verdict:
             Time of the tick [ns], and how long silence is no news [s].
         has_data, has_phase : bool
             Whether something was compared since the last tick, and whether with its phase.
-        is_steady : bool
-            Whether the speed is constant; limits of zones are made for that.
+        is_steady : callable
+            Tells whether the speed is constant; limits of zones are made for that.
         counts : mapping
             What else belongs to the values.
 
@@ -48,7 +48,7 @@ class Verdict:
         yield Zoned(self._machine, now_ns, zones, {} if stale else dict(self._zones))
         if self._heard_ns is None:
             return  # a machine without sensors is not stale
-        level, summary = self._level(is_steady=is_steady)
+        level, summary = self._level(is_steady)
         if stale:
             level, summary = Level.STALE, self._silence()
         elif not has_phase and has_data:
@@ -78,7 +78,7 @@ class Verdict:
                          f'{channel}: {said} the band of the prediction, {share:.0f} % of the '
                          'amplitudes lie in it')
 
-    def _level(self, *, is_steady: bool) -> tuple[Level, str]:
+    def _level(self, is_steady: Callable[[], bool]) -> tuple[Level, str]:
         """Return level and sentence of what is measured."""
         level, said = Level.OK, []
         for source, states in (('measured', self._vibration.measured),
@@ -87,7 +87,7 @@ class Verdict:
                 said.append(_zone(source, *found))
         if found := worst(self._vibration.measured):
             level = LEVELS[found[1].zone or 'A']
-            if not is_steady and level is Level.ERROR:
+            if level is Level.ERROR and not is_steady():
                 level = Level.WARN
                 said.append('speed changes')
         faults = list(self._passing.faults)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from scipy.stats import qmc
 
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.physics.coupled import CoupledModel
@@ -68,6 +67,8 @@ class SoilSpread:
             Up to which the support model holds.
 
         """
+        from scipy.stats import qmc  # takes a quarter of a second to import
+
         factor = self.shear_modulus_factor
         extremes = [Soil(soil.shear_modulus * end, soil.poisson_ratio, soil.density,
                          soil.loss_factor) for end in (1.0, 1.0 / factor, factor)]
