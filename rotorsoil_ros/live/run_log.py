@@ -74,6 +74,16 @@ class RunLog:
         if (self.path and settings.rerun) or settings.rerun_url:
             self._viewer = self._open_viewer(settings, machines)
 
+    @property
+    def is_written(self) -> bool:
+        """Whether there is a bag."""
+        return self._bag is not None
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether there is a recording or a viewer."""
+        return self._viewer is not None
+
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
         if self._bag is not None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from rcl_interfaces.msg import Log
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
@@ -118,8 +119,9 @@ class Watch:
 
     def _sinks(self) -> list[Sink]:
         encoder = Encoder(self._machine.table.channels, self._topics)
-        sinks: list[Sink] = [Messenger(encoder, [self._send, self._log.write]), self._tell]
-        return [*sinks, self._log.show] if self._is_shown else sinks
+        outlets = [self._send, self._log.write] if self._log.is_written else [self._send]
+        sinks: list[Sink] = [Messenger(encoder, outlets), self._tell]
+        return [*sinks, self._log.show] if self._is_shown and self._log.is_shown else sinks
 
     def _tell(self, event: Event) -> None:
         """Say in the node's own log what somebody should act on."""
@@ -158,9 +160,10 @@ class Watch:
             self._node.create_lifecycle_publisher(
                 TYPES[kind], f'~/{self.name}/{name}', LATCHED if kind == STRING else OUTPUT)
             for name, kind in OWN_TOPICS.items()]
-        self._publishers = {publisher.topic_name: publisher
+        # Past the lifecycle's own gate, which takes a microsecond: nothing is sent unless active.
+        self._publish_on = {publisher.topic_name: partial(Publisher.publish, publisher)
                             for publisher in (*self._own_publishers, diagnostics)}
-        return Topics(*self._publishers)
+        return Topics(*self._publish_on)
 
     def _subscribe(self) -> None:
         for name, kind in TOPICS.items():
@@ -199,9 +202,10 @@ class Watch:
             taken_in((self._node.get_clock().now().nanoseconds,), (cdr,))
 
     def _send(self, records: Records) -> None:
-        publish = self._publishers[records.topic].publish
-        for payload in records.payloads:
-            publish(payload)
+        if self.is_active:
+            publish = self._publish_on[records.topic]
+            for payload in records.payloads:
+                publish(payload)
 
     def _unbalance(self) -> Any:
         return self._settings.unbalance(self.name, self._machine.table.planes)
