@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from rotorsoil_ros.live.aside import Aside
 from rotorsoil_ros.live.bag_aside import BagAside
 from rotorsoil_ros.live.bag_writer import new_directory
-from rotorsoil_ros.live.events import Diagnostics, Event
+from rotorsoil_ros.live.events import Diagnostics, Event, Model
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Records
 from rotorsoil_ros.live.recorder import Recorder
@@ -152,6 +152,7 @@ class Show:
     def __init__(self, begin: 'Callable[[Path | None], RerunSink]', first: Path | None) -> None:
         self._begin = begin
         self._sink = begin(first)
+        self._models: dict[str, Model] = {}
 
     def take(self, batch: list[Event | Path]) -> None:
         """Show events; at a path go on in a new recording."""
@@ -159,8 +160,12 @@ class Show:
             if isinstance(item, Path):
                 self._sink.close()
                 self._sink = self._begin(item)
-            else:
-                self._sink(item)
+                for model in self._models.values():  # on which what follows rests
+                    self._sink(model)
+                continue
+            if isinstance(item, Model):
+                self._models[item.machine] = item
+            self._sink(item)
         self._sink.flush()
 
     def close(self) -> None:

@@ -1,5 +1,6 @@
 """The recording shows what an engineer looks for, at the time at which it happened."""
 
+from pathlib import Path
 import warnings
 
 import numpy as np
@@ -11,11 +12,12 @@ from rotorsoil_ros.live.events import (
     Compared,
     Diagnostics,
     Level,
+    Model,
     Predicted,
     Remark,
     Zoned,
 )
-from rotorsoil_ros.live.run_log import LogSettings, open_viewer, RunLog
+from rotorsoil_ros.live.run_log import LogSettings, open_viewer, RunLog, Show
 from rotorsoil_ros.physics.errors import InputError
 
 START = 1_790_000_000_000_000_000
@@ -267,3 +269,30 @@ def test_without_rerun_the_reason_is_told(machine, tmp_path, monkeypatch):
     monkeypatch.setattr('rotorsoil_ros.live.run_log.find_spec', lambda name: None)
     with pytest.raises(InputError, match='rerun-sdk is not installed'):
         open_viewer(tmp_path / 'run.rrd', {'fan': machine})
+
+
+class Collected(list):
+    """What stands in for a recording: events as they were shown."""
+
+    __call__ = list.append
+
+    def flush(self):
+        """Do nothing: all is here."""
+
+    close = flush
+
+
+def test_a_new_recording_opens_with_the_models_that_it_rests_on():
+    made = []
+
+    def begin(path):
+        made.append(Collected([path]))
+        return made[-1]
+
+    show = Show(begin, None)
+    first, second, other = (Model(name, stamp, {}) for name, stamp in (
+        ('fan', 1), ('fan', 2), ('pump', 3)))
+    show.take([first, second, other])
+    show.take([Path('next.rrd'), Model('fan', 4, {})])
+    show.close()
+    assert made[1][:3] == [Path('next.rrd'), second, other]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rotorsoil_ros.physics.band import ResponseBand, SoilSpread
+from rotorsoil_ros.physics.band import Envelope, ResponseBand, SoilSpread
 from rotorsoil_ros.physics.cone import ConeModel
 from rotorsoil_ros.physics.errors import RotorSoilError
 from rotorsoil_ros.physics.response import ResponseTable
@@ -99,3 +99,17 @@ def test_impossible_spread_is_refused(change, rule):
         SoilSpread(**change)
 
 
+
+
+def test_envelope_at_one_speed_has_the_bits_of_many():
+    random = np.random.default_rng(4)
+    edges = np.sort(random.uniform(10.0, 100.0, 30))
+    envelope = Envelope(edges, *random.normal(size=(4, 30, 5)))
+    speed = np.concatenate([random.uniform(0.0, 110.0, 200), edges, [np.nan]])
+    together = envelope.at(speed)
+    for name in ('low', 'high', 'behind', 'ahead'):
+        apart = [getattr(envelope.at(speed[row:row + 1]), name) for row in range(len(speed))]
+        np.testing.assert_array_equal(np.concatenate(apart), getattr(together, name))
+    inside = (speed >= edges[0]) & (speed <= edges[-1])
+    assert np.isfinite(together.low).all(axis=1).tolist() == inside.tolist()
+    np.testing.assert_allclose(together.low[200:230], envelope.low, rtol=1e-9, atol=1e-9)
