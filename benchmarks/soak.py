@@ -2,9 +2,10 @@
 Let a machine run for a day in minutes and see whether memory stays where it is.
 
 Sends speeds at 100 Hz of message time through the path of the node's callback (CDR in,
-look-up, CDR out, MCAP log with splits), flushing once per second of message time as the node
-does, and prints resident memory and cost per message along the way. With `--machines N` the
-same number of messages is spread over N machines: the cost per message must not depend on it.
+look-up, CDR out, MCAP log with splits), and with every tenth a measured vector that is held
+against the prediction; does once per second of message time what the node does then; and prints
+resident memory and cost per message along the way. With `--machines N` the same number of
+messages is spread over N machines: the cost per message must not depend on it.
 
     python benchmarks/soak.py [--messages N] [--machines N] [--no-log]
 """
@@ -22,8 +23,9 @@ import time
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
+from rotorsoil_ros.case.criteria import criteria
 from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.inlets import inlet, MeasuredInlet, ROTOR_JOINT, SpeedInlet
+from rotorsoil_ros.live.inlets import Inlet, inlet, MEASURED_TOPICS, ROTOR_JOINT
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Encoder, Messenger, pack_stamp, Topics
 from rotorsoil_ros.live.monitor import Monitor
@@ -31,6 +33,7 @@ from rotorsoil_ros.live.run_log import LogSettings, RunLog
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 RATE_HZ = 100
+MEASURED_EVERY = 10
 DAY = 24 * 3600 * RATE_HZ
 LOOKS = 20
 FLAT = 0.02
@@ -49,11 +52,15 @@ def speeds() -> Iterator[bytes]:
     step = 0
     while True:
         message.velocity[0] = 400.0 + 300.0 * math.sin(step / (60 * RATE_HZ) * 2.0 * math.pi)
-        body = bytearray(serialize_message(message))
-        stamp = START_NS + step * NANOSECONDS // RATE_HZ
-        body[4:12] = pack_stamp(*divmod(stamp, NANOSECONDS))
-        yield bytes(body)
+        yield stamped(message, step)
         step += 1
+
+
+def stamped(message: JointState, step: int) -> bytes:
+    """Return a message at the time of a step."""
+    body = bytearray(serialize_message(message))
+    body[4:12] = pack_stamp(*divmod(START_NS + step * NANOSECONDS // RATE_HZ, NANOSECONDS))
+    return bytes(body)
 
 
 class Plant:
@@ -68,15 +75,29 @@ class Plant:
         self.log = RunLog(
             settings, {}, tell=lambda text: None, complain=self._complaints.append)
         stack.callback(self.log.close)
-        self.monitors, self.inlets = [], list[SpeedInlet | MeasuredInlet]()
+        self.monitors, self.inlets = [], list[Inlet]()
+        self._measured: list[list[Inlet]] = []
+        judged_by = criteria(
+            machine.case, machine.model, machine.case.unbalance, directory / 'cache')
         for name in names:
             encoder = Encoder(machine.table.channels, Topics.of('', name))
             monitor = Monitor(name, machine.table, machine.case.unbalance, sinks=[
                 Messenger(encoder, [lambda records: None, self.log.write]), self.log.show])
+            monitor.judge.take_criteria(judged_by)
             monitor.begin(START_NS, machine.description(name, machine.case.unbalance))
             self.monitors.append(monitor)
             self.inlets.append(inlet('joint_states', f'/{name}/joint_states', monitor,
                                      rotor_joint=ROTOR_JOINT, log=self.log.write))
+            self._measured.append([
+                inlet(kind, f'/{name}/{kind}', monitor, rotor_joint=ROTOR_JOINT,
+                      log=self.log.write) for kind in MEASURED_TOPICS])
+
+    def measure(self, step: int) -> None:
+        """Tell one machine a vector of one of its housings."""
+        message = JointState(name=['bearing_2_housing_x'], position=[1e-6], velocity=[math.nan],
+                             effort=[math.nan])
+        for taken_in in self._measured[step // MEASURED_EVERY % len(self._measured)]:
+            taken_in((0,), (stamped(message, step),))
 
     def second(self, now_ns: int) -> None:
         """Do what the node does once a second."""
@@ -96,6 +117,8 @@ def run(plant: Plant, messages: int) -> tuple[list[float], float]:
         before = time.thread_time_ns()
         taken_in((0,), (cdr,))
         spent += time.thread_time_ns() - before
+        if step % MEASURED_EVERY == 0:
+            plant.measure(step)
         if step % RATE_HZ == RATE_HZ - 1:
             plant.second(START_NS + step * NANOSECONDS // RATE_HZ)
         if step % (messages // LOOKS) == messages // LOOKS - 1:

@@ -31,13 +31,12 @@ from rotorsoil_ros.live.verdict import Verdict
 from rotorsoil_ros.live.vibration import Vibration
 from rotorsoil_ros.physics.arrays import BoolArray, FloatArray, IntArray
 from rotorsoil_ros.physics.comparison import ABOVE_NOISE, Matching, nearest
-from rotorsoil_ros.physics.quasistatic import is_quasi_static
+from rotorsoil_ros.physics.quasistatic import is_quasi_static, SLOPE_SAMPLES
 from rotorsoil_ros.physics.response import Predictor
 
 MOST_NAMES = 16
 REPEAT_NS = NANOSECONDS  # after which a band is told again although the speed has not moved
 MOVED = 1e-3  # share of a speed
-WINDOW_NS = 5 * NANOSECONDS  # of speeds from which their rate is told
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +224,8 @@ class Judge:
     def _counting(self, compared: Compared, criteria: Criteria) -> BoolArray:
         """Return which points may be held against the machine, (n, channels)."""
         stamps, speed, _ = self.history.track()
-        recent = stamps >= min(self.history.last_ns, int(compared.stamp_ns[0])) - WINDOW_NS
+        first = int(np.searchsorted(stamps, compared.stamp_ns.min()))
+        recent = slice(max(0, first - SLOPE_SAMPLES), None)
         stamps, speed = stamps[recent], speed[recent]
         slow = is_quasi_static((stamps - stamps[:1]) / NANOSECONDS, speed, criteria.resonances)
         index = nearest(compared.stamp_ns, stamps, tolerance=math.inf)

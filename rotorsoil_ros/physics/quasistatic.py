@@ -24,7 +24,7 @@ DECAY = 5.0
 LARGEST_SHIFT = 2.16
 
 # Samples over which a slope is fitted: speeds out of single turns scatter.
-_SLOPE_SAMPLES = 15
+SLOPE_SAMPLES = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +52,13 @@ def passage_number(resonance: Resonance, rate: float) -> float:
 def speed_rate(time: FloatArray, speed: FloatArray) -> FloatArray:
     """Return the rate of speed [rad/s^2] at each sample, a slope fitted over its neighbours."""
     rates = np.zeros_like(speed)
-    half = _SLOPE_SAMPLES // 2
+    half = SLOPE_SAMPLES // 2
     inner = np.arange(half, max(half, len(time) - half))
     if len(inner):
-        since = sliding_window_view(time, _SLOPE_SAMPLES)
+        since = sliding_window_view(time, SLOPE_SAMPLES)
         since = since - since.mean(axis=1, keepdims=True)
         spread = np.sum(since**2, axis=1)
-        slope = np.sum(since * sliding_window_view(speed, _SLOPE_SAMPLES), axis=1)
+        slope = np.sum(since * sliding_window_view(speed, SLOPE_SAMPLES), axis=1)
         np.divide(slope, spread, out=rates[inner[0]:inner[-1] + 1], where=spread > 0.0)
     for index in np.setdiff1d(np.arange(len(time)), inner):
         near = slice(max(0, index - half), index + half + 1)
