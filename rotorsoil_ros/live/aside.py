@@ -44,6 +44,11 @@ class Aside(Generic[Item]):
         items, self._items = self._items, []
         self.put(items)
 
+    @property
+    def backlog(self) -> int:
+        """Batches that wait for the thread."""
+        return self._batches.qsize()
+
     def put(self, batch: list[Item], *, wait_s: float = 0.0) -> bool:
         """Hand over a batch; return whether there was room for it."""
         try:

@@ -48,6 +48,11 @@ class BagAside:
         """The file that is being written."""
         return self._recorder.file
 
+    @property
+    def backlog(self) -> int:
+        """Batches that wait for the disk, of 64 records at most."""
+        return self._aside.backlog
+
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
         self._waiting.append(records)

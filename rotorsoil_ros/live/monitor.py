@@ -7,7 +7,7 @@ import numpy as np
 
 from rotorsoil_ros.live.events import Diagnostics, Event, Measured, Model, Predicted, Samples, Sink
 from rotorsoil_ros.live.health import Health
-from rotorsoil_ros.live.judge import Judge, Judging
+from rotorsoil_ros.live.judging.judge import Judge, Judging
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.errors import OutOfTableError
 from rotorsoil_ros.physics.prediction import Prediction

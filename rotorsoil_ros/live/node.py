@@ -27,7 +27,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from rotorsoil_ros.case import cache
-from rotorsoil_ros.live.bench import Bench
+from rotorsoil_ros.live.judging.bench import Bench
 from rotorsoil_ros.live.loading import load_all
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import (

@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.live.inlets import ROTOR_JOINT
-from rotorsoil_ros.live.judge import Judging
+from rotorsoil_ros.live.judging.judge import Judging
 from rotorsoil_ros.physics.arrays import ComplexArray
 from rotorsoil_ros.physics.comparison import Matching
 from rotorsoil_ros.physics.errors import InputError

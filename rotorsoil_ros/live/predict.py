@@ -12,7 +12,7 @@ from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.bag_writer import LogFile
 from rotorsoil_ros.live.events import LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.live.inlets import Inlet, inlet, ROTOR_JOINT, SPEED_TOPICS
-from rotorsoil_ros.live.judge import Judging
+from rotorsoil_ros.live.judging.judge import Judging
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import Encoder, Messenger, Records, Topics
 from rotorsoil_ros.live.monitor import Monitor

@@ -84,6 +84,11 @@ class RunLog:
         """Whether there is a recording or a viewer."""
         return self._viewer is not None
 
+    @property
+    def backlog(self) -> int:
+        """Batches of messages that wait for the disk."""
+        return 0 if self._bag is None else self._bag.backlog
+
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
         if self._bag is not None:

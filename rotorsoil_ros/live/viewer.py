@@ -9,9 +9,6 @@ import numpy as np
 import rerun as rr
 
 from rotorsoil_ros.case.criteria import Criteria, stored_criteria
-from rotorsoil_ros.live.blueprint import blueprint, Shown
-from rotorsoil_ros.live.bode import Bode
-from rotorsoil_ros.live.channels import trends
 from rotorsoil_ros.live.events import (
     Band,
     Compared,
@@ -26,13 +23,16 @@ from rotorsoil_ros.live.events import (
     Zoned,
 )
 from rotorsoil_ros.live.machine import Machine
-from rotorsoil_ros.live.orbits import Orbits
-from rotorsoil_ros.live.picture import FRAME_NS, Picture
-from rotorsoil_ros.live.recording import Recording
-from rotorsoil_ros.live.scene import Scene
-from rotorsoil_ros.live.trend_lines import TrendLines
-from rotorsoil_ros.live.waterfall import ORDERS, Waterfall
-from rotorsoil_ros.live.zone_lane import ZoneLane
+from rotorsoil_ros.live.screen.blueprint import blueprint, Shown
+from rotorsoil_ros.live.screen.bode import Bode
+from rotorsoil_ros.live.screen.channels import trends
+from rotorsoil_ros.live.screen.orbits import Orbits
+from rotorsoil_ros.live.screen.picture import FRAME_NS, Picture
+from rotorsoil_ros.live.screen.recording import Recording
+from rotorsoil_ros.live.screen.scene import Scene
+from rotorsoil_ros.live.screen.trend_lines import TrendLines
+from rotorsoil_ros.live.screen.waterfall import ORDERS, Waterfall
+from rotorsoil_ros.live.screen.zone_lane import ZoneLane
 from rotorsoil_ros.physics.arrays import ComplexArray
 
 APPLICATION = 'rotorsoil'

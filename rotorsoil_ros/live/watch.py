@@ -12,10 +12,10 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.case import config
-from rotorsoil_ros.live.bench import Bench
 from rotorsoil_ros.live.events import Event, Level, Remark, Sink
 from rotorsoil_ros.live.imu import IMU
 from rotorsoil_ros.live.inlets import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.live.judging.bench import Bench
 from rotorsoil_ros.live.loading import reload
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.messages import (

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip('rerun', reason='rerun-sdk is optional')
 
-from rotorsoil_ros.live.chart import Axis, curve, round_up
+from rotorsoil_ros.live.screen.chart import Axis, curve, round_up
 
 
 def test_a_linear_axis_is_linear_and_keeps_what_is_beyond_at_its_end():

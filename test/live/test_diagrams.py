@@ -11,13 +11,13 @@ from rotorsoil_ros.live.events import Compared, Model, Predicted, Samples
 
 rr = pytest.importorskip('rerun', reason='rerun-sdk is optional')
 
-from rotorsoil_ros.live.blueprint import blueprint, Shown  # noqa: E402
-from rotorsoil_ros.live.bode import Bode  # noqa: E402
-from rotorsoil_ros.live.channels import trends  # noqa: E402
-from rotorsoil_ros.live.orbits import Orbits  # noqa: E402
-from rotorsoil_ros.live.scene import Scene  # noqa: E402
+from rotorsoil_ros.live.screen.blueprint import blueprint, Shown  # noqa: E402
+from rotorsoil_ros.live.screen.bode import Bode  # noqa: E402
+from rotorsoil_ros.live.screen.channels import trends  # noqa: E402
+from rotorsoil_ros.live.screen.orbits import Orbits  # noqa: E402
+from rotorsoil_ros.live.screen.scene import Scene  # noqa: E402
+from rotorsoil_ros.live.screen.waterfall import COLUMNS, LOUDEST, QUIETEST, spectrum, Waterfall  # noqa: E402
 from rotorsoil_ros.live.viewer import MachineView  # noqa: E402
-from rotorsoil_ros.live.waterfall import COLUMNS, LOUDEST, QUIETEST, spectrum, Waterfall  # noqa: E402
 
 START = 1_790_000_000_000_000_000
 SECOND = 10**9
@@ -307,7 +307,7 @@ def test_a_machine_on_a_rigid_base_has_no_views_of_housings(tmp_path, case_file)
 
 
 def test_only_stations_that_can_move_have_an_orbit(machine):
-    from rotorsoil_ros.live.orbits import cells
+    from rotorsoil_ros.live.screen.orbits import cells
     found = [cell.station for cell in cells(machine.case, machine.table.channels)]
     assert found == ['bearing_1_journal', 'disc_1', 'bearing_2_journal', 'disc_2',
                      'bearing_1_housing', 'bearing_2_housing']

@@ -19,7 +19,7 @@ from rotorsoil_ros.live.events import (
     Samples,
     Zoned,
 )
-from rotorsoil_ros.live.judge import Judging
+from rotorsoil_ros.live.judging.judge import Judging
 from rotorsoil_ros.live.machine import Machine
 from rotorsoil_ros.live.monitor import Monitor
 from rotorsoil_ros.physics.comparison import Matching

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from rotorsoil_ros.live.scene import round_scale, Scene
+from rotorsoil_ros.live.screen.scene import round_scale, Scene
 
 
 @pytest.fixture

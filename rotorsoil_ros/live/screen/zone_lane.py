@@ -5,7 +5,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rotorsoil_ros.live.events import Zoned
-from rotorsoil_ros.live.recording import Recording
+from rotorsoil_ros.live.screen.recording import Recording
 
 MEASURED, PREDICTED = 'measured', 'predicted'
 UNKNOWN = '-'

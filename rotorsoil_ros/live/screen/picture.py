@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 
 from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.recording import Recording
-from rotorsoil_ros.live.scene import Block, Scene
+from rotorsoil_ros.live.screen.recording import Recording
+from rotorsoil_ros.live.screen.scene import Block, Scene
 from rotorsoil_ros.physics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.units import rad_s_to_rpm
 

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import rerun as rr
 
-from rotorsoil_ros.live.channels import HOUSINGS, MICRO, Trend
 from rotorsoil_ros.live.events import Band, Compared, NANOSECONDS
-from rotorsoil_ros.live.recording import Recording, TREND_NS
+from rotorsoil_ros.live.screen.channels import HOUSINGS, MICRO, Trend
+from rotorsoil_ros.live.screen.recording import Recording, TREND_NS
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.units import rad_s_to_rpm
 from rotorsoil_ros.physics.zones import support_class, ZoneLimits

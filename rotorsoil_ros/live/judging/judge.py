@@ -12,7 +12,6 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.criteria import Criteria
 from rotorsoil_ros.case.expectation import answer
 from rotorsoil_ros.case.housing_zones import HOUSING
-from rotorsoil_ros.live.demodulator import Demodulator
 from rotorsoil_ros.live.events import (
     Band,
     Compared,
@@ -23,12 +22,13 @@ from rotorsoil_ros.live.events import (
     Remark,
     Samples,
 )
-from rotorsoil_ros.live.history import History
-from rotorsoil_ros.live.pairing import Pairing, Vectors
-from rotorsoil_ros.live.passing import Passing
-from rotorsoil_ros.live.runout import Runout
-from rotorsoil_ros.live.verdict import Verdict
-from rotorsoil_ros.live.vibration import Vibration
+from rotorsoil_ros.live.judging.demodulator import Demodulator
+from rotorsoil_ros.live.judging.history import History
+from rotorsoil_ros.live.judging.pairing import Pairing, Vectors
+from rotorsoil_ros.live.judging.passing import Passing
+from rotorsoil_ros.live.judging.runout import Runout
+from rotorsoil_ros.live.judging.verdict import Verdict
+from rotorsoil_ros.live.judging.vibration import Vibration
 from rotorsoil_ros.physics.arrays import BoolArray, FloatArray, IntArray
 from rotorsoil_ros.physics.comparison import ABOVE_NOISE, Matching, nearest
 from rotorsoil_ros.physics.quasistatic import is_quasi_static, SLOPE_SAMPLES

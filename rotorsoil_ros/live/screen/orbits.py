@@ -10,11 +10,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.live.bode import MEASURED, PREDICTED
-from rotorsoil_ros.live.channels import MICRO, moving_housings
-from rotorsoil_ros.live.chart import drawn_grid, Label, round_up, TEXT, written
 from rotorsoil_ros.live.events import Compared, NANOSECONDS
-from rotorsoil_ros.live.recording import Recording
+from rotorsoil_ros.live.screen.bode import MEASURED, PREDICTED
+from rotorsoil_ros.live.screen.channels import MICRO, moving_housings
+from rotorsoil_ros.live.screen.chart import drawn_grid, Label, round_up, TEXT, written
+from rotorsoil_ros.live.screen.recording import Recording
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.comparison import nearest
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping
 
 from rotorsoil_ros.live.events import Diagnostics, Event, Level, NANOSECONDS, Remark, Zoned
-from rotorsoil_ros.live.passing import Passing
-from rotorsoil_ros.live.vibration import HousingState, LEVELS, MM, values, Vibration, worst
+from rotorsoil_ros.live.judging.passing import Passing
+from rotorsoil_ros.live.judging.vibration import HousingState, LEVELS, MM, values, Vibration, worst
 
 VIBRATION = 'vibration'
 

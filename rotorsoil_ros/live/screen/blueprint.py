@@ -8,8 +8,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.live.bode import Bode
-from rotorsoil_ros.live.channels import (
+from rotorsoil_ros.live.screen.bode import Bode
+from rotorsoil_ros.live.screen.channels import (
     BLOCK,
     DISCS,
     HOUSINGS,
@@ -19,11 +19,11 @@ from rotorsoil_ros.live.channels import (
     ROCKING,
     Trend,
 )
-from rotorsoil_ros.live.orbits import Orbits
-from rotorsoil_ros.live.recording import TIMELINE
-from rotorsoil_ros.live.scene import Scene
-from rotorsoil_ros.live.waterfall import Waterfall
-from rotorsoil_ros.live.zone_lane import ZoneLane
+from rotorsoil_ros.live.screen.orbits import Orbits
+from rotorsoil_ros.live.screen.recording import TIMELINE
+from rotorsoil_ros.live.screen.scene import Scene
+from rotorsoil_ros.live.screen.waterfall import Waterfall
+from rotorsoil_ros.live.screen.zone_lane import ZoneLane
 
 # What is measured most often comes first: its tab is the one that is open. Amplitudes of
 # housings are shown as velocities already.

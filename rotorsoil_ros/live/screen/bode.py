@@ -9,10 +9,19 @@ import rerun.blueprint as rrb
 
 from rotorsoil_ros.case.expectation import answer
 from rotorsoil_ros.case.peaks import resolved_speeds
-from rotorsoil_ros.live.channels import MICRO, Trend
-from rotorsoil_ros.live.chart import Axis, curve, drawn_grid, grid, Label, LINE, round_up, written
 from rotorsoil_ros.live.events import Compared, NANOSECONDS
-from rotorsoil_ros.live.recording import Recording
+from rotorsoil_ros.live.screen.channels import MICRO, Trend
+from rotorsoil_ros.live.screen.chart import (
+    Axis,
+    curve,
+    drawn_grid,
+    grid,
+    Label,
+    LINE,
+    round_up,
+    written,
+)
+from rotorsoil_ros.live.screen.recording import Recording
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.band import Envelope
 from rotorsoil_ros.physics.response import Predictor

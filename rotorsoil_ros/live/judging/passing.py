@@ -7,7 +7,7 @@ import numpy as np
 from rotorsoil_ros.case.housing_zones import STEADY
 from rotorsoil_ros.case.peak_pairs import peak_fault, peaks_of
 from rotorsoil_ros.live.events import Compared, Level, Remark
-from rotorsoil_ros.live.history import History
+from rotorsoil_ros.live.judging.history import History
 from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.physics.comparison import ChannelPoints, Reason, Reference
 from rotorsoil_ros.physics.passages import PeakPair, sweeps, told_once

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rotorsoil_ros.live.events import Demodulated, Measured, NANOSECONDS
-from rotorsoil_ros.live.history import History
+from rotorsoil_ros.live.judging.history import History
 from rotorsoil_ros.physics.arrays import FloatArray
 
 MOST = 1024  # vectors that wait; what waits longer is given up

@@ -6,8 +6,8 @@ import math
 import numpy as np
 
 from rotorsoil_ros.live.events import Demodulated, NANOSECONDS, Samples
-from rotorsoil_ros.live.history import History
 from rotorsoil_ros.live.imu import LARGEST
+from rotorsoil_ros.live.judging.history import History
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 from rotorsoil_ros.physics.errors import NotSolvedError
 from rotorsoil_ros.physics.orders import demodulate, OrderVector

@@ -7,9 +7,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from scipy.signal import get_window
 
-from rotorsoil_ros.live.chart import Axis, drawn_grid, grid, Label, written
 from rotorsoil_ros.live.events import NANOSECONDS, Samples
-from rotorsoil_ros.live.recording import Recording
+from rotorsoil_ros.live.screen.chart import Axis, drawn_grid, grid, Label, written
+from rotorsoil_ros.live.screen.recording import Recording
 from rotorsoil_ros.physics.arrays import FloatArray, IntArray
 
 COLUMNS, ROWS = 160, 80

@@ -1,0 +1,1 @@
+"""What is measured held against what is predicted, while the machine runs."""
