@@ -13,8 +13,10 @@ from rotorsoil_ros.live import bag_reader
 from rotorsoil_ros.live.messages import JOINT_STATE
 from rotorsoil_ros.physics.errors import InputError
 
-STOPS_WITHIN_S = 1.0
-STARTS_WITHIN_S = 3.0
+# Far above what benchmarks/lookup.py measures (0.3 s and 1.5 s): a busy machine is no failure,
+# a hang or a table that is computed again is one.
+STOPS_WITHIN_S = 4.0
+STARTS_WITHIN_S = 10.0
 
 
 @pytest.fixture
