@@ -14,7 +14,7 @@ from rotorsoil_ros.live.messages import JOINT_STATE
 from rotorsoil_ros.physics.errors import InputError
 
 # Far above what benchmarks/lookup.py measures (0.3 s and 1.5 s): a busy machine is no failure,
-# a hang or a table that is computed again is one.
+# a hang is one.
 STOPS_WITHIN_S = 4.0
 STARTS_WITHIN_S = 10.0
 
