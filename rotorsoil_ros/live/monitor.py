@@ -38,7 +38,7 @@ class Monitor:
     def set_unbalance(self, unbalance: ComplexArray) -> None:
         """Use another unbalance, (planes,) [kg m], from the next speed on."""
         self._predictor = self.table.predictor(unbalance)
-        self.judge.take_predictor(self._predictor, is_same_machine=True)
+        self.judge.take_predictor(self._predictor)
 
     def on_speed(
         self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray | None = None,
@@ -61,10 +61,11 @@ class Monitor:
 
     def take_table(
         self, table: ResponseTable, unbalance: ComplexArray, *, sinks: Sequence[Sink],
+        judging: Judging | None = None,
     ) -> None:
-        """Answer from another table, from the next speed on."""
+        """Answer from another table and judge by other rules, from the next speed on."""
         self._predictor = table.predictor(unbalance)
-        self.judge.take_predictor(self._predictor, is_same_machine=False)
+        self.judge = Judge(self.machine, self._predictor, judging or Judging())
         self.table, self._sinks = table, tuple(sinks)
         self.health.speed_range = table.speed_range
 

@@ -95,7 +95,9 @@ class Watch:
         """Answer from another case, from the next speed on; return what to say of it."""
         self._machine = machine
         self._settings.renew_unbalance(self.name, machine.table.planes, machine.case.unbalance)
-        self.monitor.take_table(machine.table, self._unbalance(), sinks=self._sinks())
+        self.monitor.take_table(
+            machine.table, self._unbalance(), sinks=self._sinks(),
+            judging=self._settings.judging(self.name, machine.case))
         if self.is_active:
             self.monitor.describe(
                 self._node.get_clock().now().nanoseconds, self._description())

@@ -523,3 +523,17 @@ def test_a_passage_is_over_when_nothing_more_is_measured(run):
         run.turns(end + second, 185.0 - 0.1 * second)
         run.ticks(end + second)
     assert [event.level for event in peaks(run)] == [Level.WARN]
+
+
+def test_another_case_is_judged_by_its_own_limits(fan, basis):
+    run = Run(fan, basis)
+    dwell(run, [3e-3])
+    assert run.vibration()[-1].values[f'{X}_measured_zone'] == 'B'  # flexible, group 2
+    strict = ZoneLimits('strict', (0.1e-3, 0.2e-3, 0.3e-3), (0.1e-3, 0.2e-3, 0.3e-3))
+    run.monitor.take_table(fan.table, fan.case.unbalance, sinks=[run.events.append],
+                           judging=Judging.of(replace(fan.case, zones=strict)))
+    dwell(run, [3e-3], start=5.0)
+    assert run.vibration()[-1].values.get(f'{X}_measured_zone') is None  # not known yet
+    run.monitor.judge.take_criteria(basis)
+    dwell(run, [3e-3] * 2, start=10.0)
+    assert run.vibration()[-1].level is Level.ERROR

@@ -1,7 +1,7 @@
 """Does the machine behave as predicted? Measured vectors against the answers, while it runs."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 import math
 
@@ -30,6 +30,7 @@ from rotorsoil_ros.live.judging.runout import Runout
 from rotorsoil_ros.live.judging.verdict import Verdict
 from rotorsoil_ros.live.judging.vibration import Vibration
 from rotorsoil_ros.physics.arrays import BoolArray, FloatArray, IntArray
+from rotorsoil_ros.physics.band import Envelope
 from rotorsoil_ros.physics.comparison import ABOVE_NOISE, Matching, nearest
 from rotorsoil_ros.physics.quasistatic import is_quasi_static, SLOPE_SAMPLES
 from rotorsoil_ros.physics.response import Predictor
@@ -78,6 +79,7 @@ class Judge:
         self.history = History()
         self._judging = judging
         self._criteria: Criteria | None = None
+        self._envelope: Envelope | None = None
         self._predictor = predictor
         rules = judging.rules
         self._pairing = Pairing(self.history, tolerance_s=rules.matching.tolerance)
@@ -92,29 +94,27 @@ class Judge:
         self._band_ns = round(judging.band_period_s * NANOSECONDS)
         self._band_told = -REPEAT_NS, 0.0
 
-    def take_predictor(self, predictor: Predictor, *, is_same_machine: bool) -> None:
-        """Judge by another unbalance, for which the band is not known yet, or another case."""
-        self._predictor = predictor
-        if self._criteria is not None:
-            self._criteria = replace(self._criteria, envelope=None) if is_same_machine else None
+    def take_predictor(self, predictor: Predictor) -> None:
+        """Judge by another unbalance, for which the band is not known yet."""
+        self._predictor, self._envelope = predictor, None
 
     def take_criteria(self, criteria: Criteria) -> None:
         """Judge by a band, resonances and natural speeds from now on."""
-        self._criteria = criteria
+        self._criteria, self._envelope = criteria, criteria.envelope
 
     def on_speed(self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> bool:
         """Note speeds [rad/s] and rotor angles [rad]; return whether `follow` has something."""
         self.history.add(stamp_ns, speed, angle)
         return (len(speed) > 1 or not self._pairing.is_idle
-                or (self._criteria is not None
+                or (self._envelope is not None
                     and self._is_band_due(int(stamp_ns[0]), float(speed[0]))))
 
     def follow(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[Event]:
         """Yield the band of these speeds, and the comparisons that waited for them."""
-        if self._criteria is not None and self._criteria.envelope is not None:
+        if self._envelope is not None:
             rows = list(self._band_rows(stamp_ns, speed))
             if rows:
-                band = self._criteria.envelope.at(speed[rows])
+                band = self._envelope.at(speed[rows])
                 yield Band(self.machine, stamp_ns[rows], speed[rows], band.low, band.high)
         yield from self._matched()
 
@@ -198,8 +198,8 @@ class Judge:
         names = tuple(channels[column] for column in known)
         amplitude, phase = self._runout.subtract(names, speed, amplitude, phase)
         low = high = np.full(amplitude.shape, np.nan)
-        if self._criteria is not None and self._criteria.envelope is not None:
-            band = self._criteria.envelope.at(speed)
+        if self._envelope is not None:
+            band = self._envelope.at(speed)
             low, high = band.low[:, columns], band.high[:, columns]
         return Compared(
             self.machine, np.array([vectors.stamp_ns for vectors in found]), speed, names,
