@@ -413,6 +413,7 @@ def test_zone_is_no_error_while_the_speed_changes(zoned):
     told = zoned.vibration()[-1]
     assert told.level is Level.WARN
     assert 'speed changes' in told.summary
+    assert [event.level for event in zoned.of(Remark)] == [Level.WARN]
 
 
 def test_silence_of_the_sensors_is_stale_and_told_once(zoned):

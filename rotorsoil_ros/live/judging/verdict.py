@@ -42,7 +42,7 @@ class Verdict:
             self._heard_ns = now_ns
         stale = (self._heard_ns is None
                  or now_ns - self._heard_ns > stale_after_s * NANOSECONDS)
-        yield from self._changes(now_ns, is_stale=stale)
+        yield from self._changes(now_ns, is_steady, is_stale=stale)
         zones = {channel: state.zone or '' for channel, state in
                  self._vibration.predicted.items()}
         yield Zoned(self._machine, now_ns, zones, {} if stale else dict(self._zones))
@@ -56,7 +56,9 @@ class Verdict:
         yield Diagnostics(self._machine, now_ns, level, summary,
                           {**values(self._vibration), **counts}, VIBRATION)
 
-    def _changes(self, now_ns: int, *, is_stale: bool) -> Iterator[Remark]:
+    def _changes(
+        self, now_ns: int, is_steady: Callable[[], bool], *, is_stale: bool,
+    ) -> Iterator[Remark]:
         """Yield a remark for every zone and every band that was left or entered."""
         if is_stale != self._is_stale and self._heard_ns is not None:
             self._is_stale = is_stale
@@ -68,7 +70,7 @@ class Verdict:
             if state.zone is not None and state.zone != before:
                 self._zones[channel] = state.zone
                 came = f' (was {before})' if before else ''
-                yield Remark(self._machine, now_ns, LEVELS[state.zone],
+                yield Remark(self._machine, now_ns, _level(state, is_steady),
                              f'{channel}: zone {state.zone}{came}, '
                              f'{MM * state.velocity:.2f} mm/s rms')
         for channel, is_outside in self._vibration.settle():
@@ -86,9 +88,8 @@ class Verdict:
             if found := worst(states):
                 said.append(_zone(source, *found))
         if found := worst(self._vibration.measured):
-            level = LEVELS[found[1].zone or 'A']
-            if level is Level.ERROR and not is_steady():
-                level = Level.WARN
+            level = _level(found[1], is_steady)
+            if level is not LEVELS[found[1].zone or 'A']:
                 said.append('speed changes')
         faults = list(self._passing.faults)
         if self._vibration.outside:
@@ -102,6 +103,12 @@ class Verdict:
         if found := worst(self._vibration.predicted):
             said += f'; {_zone("predicted", *found)}'
         return said
+
+
+def _level(state: HousingState, is_steady: Callable[[], bool]) -> Level:
+    """Return what a zone means; while the speed changes its limits do not strictly hold."""
+    level = LEVELS[state.zone or 'A']
+    return Level.WARN if level is Level.ERROR and not is_steady() else level
 
 
 def _zone(source: str, channel: str, state: HousingState) -> str:
