@@ -63,6 +63,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self._log: RunLog | None = None
         self._diagnostics: LifecyclePublisher | None = None
         self._bench: Bench | None = None
+        self._turn, self._topics = 0, set[str]()
         self._held = ExitStack()
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -143,7 +144,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
             held.callback(watch.destroy)
             self._watches.append(watch)
         timer = self.create_timer(
-            PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            PERIOD_S / len(machines), self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         held.callback(self.destroy_timer, timer)
         self._log, self._diagnostics, self._bench = log, diagnostics, bench
         settings.is_locked = True
@@ -159,6 +160,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
 
     def _forget(self) -> None:
         self.settings.is_locked = False
+        self._turn = 0
         self._watches, self._log, self._diagnostics, self._bench = [], None, None, None
 
     def _log_settings(self) -> LogSettings:
@@ -170,16 +172,19 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
             budget_mib=value('log.budget_mib'))
 
     def _tick(self) -> None:
-        """Once a second of wall time: health to the graph, logs to the disk."""
-        stale_after_s = float(self.settings.value('stale_after_s'))
-        topics = {name for name, _ in self.get_topic_names_and_types()}
-        for watch in self._watches:
-            watch.tick(self._now_ns(), stale_after_s=stale_after_s, topics=topics)
-        if self._bench is not None:
-            self._bench.step()
-        if self._log is not None:
-            self._log.flush()
-            self._report_log(self._log)
+        """Once a second of wall time for each machine, and for what they share."""
+        turn, self._turn = self._turn, (self._turn + 1) % len(self._watches)
+        if turn == 0:
+            self._topics = {name for name, _ in self.get_topic_names_and_types()}
+            if self._bench is not None:
+                self._bench.step()
+            if self._log is not None:
+                self._log.flush()
+                self._report_log(self._log)
+        # In turns: fifty at once would keep the speeds of all waiting.
+        self._watches[turn].tick(
+            self._now_ns(), stale_after_s=float(self.settings.value('stale_after_s')),
+            topics=self._topics)
 
     def _report_log(self, log: RunLog) -> None:
         """Say on /diagnostics, and so in the log itself, how logging goes."""
