@@ -1,6 +1,6 @@
 """How an event reads as ROS messages: the one mapping, used by publishers and logs alike."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import struct
@@ -38,7 +38,7 @@ NODE_NAME = 'rotorsoil'
 LOG = 'rcl_interfaces/msg/Log'
 MOST_LAYOUTS = 64  # sets of channels that are measured together; more than that nobody means
 
-# Topics of a machine below the node's name, in the order of `Topics`, and their types.
+# Topics of a machine below the node's name, and their types.
 OWN_TOPICS = {
     'amplitude': JOINT_STATE, 'phase': JOINT_STATE, 'amplitude_low': JOINT_STATE,
     'amplitude_high': JOINT_STATE, 'residual': JOINT_STATE,
@@ -80,7 +80,13 @@ class Topics:
     def of(cls, namespace: str, machine: str) -> 'Topics':
         """Name the topics as a node that nobody renamed does; namespace `` or `/plant`."""
         own = f'{namespace}/{NODE_NAME}/{machine}'
-        return cls(*(f'{own}/{name}' for name in OWN_TOPICS))
+        return cls.named({name: f'{own}/{name}' for name in OWN_TOPICS})
+
+    @classmethod
+    def named(cls, topics: Mapping[str, str], *, diagnostics: str = DIAGNOSTICS_TOPIC) -> 'Topics':
+        """Take the full names of OWN_TOPICS, by their names below the machine's."""
+        return cls(diagnostics=diagnostics, **{
+            name.replace('/', '_'): topic for name, topic in topics.items()})
 
 
 def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
@@ -158,8 +164,9 @@ class Encoder:
             case Band():
                 yield from self._band(event)
             case Compared(stamp_ns=stamps, speed=speed, channels=channels):
-                yield self._states(self._topics.residual, channels, stamps, event.residual,
-                                   speed[:, None] * event.residual)
+                residual = event.residual
+                yield self._states(self._topics.residual, channels, stamps, residual,
+                                   speed[:, None] * residual)
             case Demodulated():
                 yield from self._demodulated(event)
             case Remark(stamp_ns=stamp_ns):

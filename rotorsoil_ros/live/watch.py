@@ -165,7 +165,10 @@ class Watch:
         # Past the lifecycle's own gate, which takes a microsecond: nothing is sent unless active.
         self._publish_on = {publisher.topic_name: partial(Publisher.publish, publisher)
                             for publisher in (*self._own_publishers, diagnostics)}
-        return Topics(*self._publish_on)
+        return Topics.named(
+            {name: publisher.topic_name for name, publisher in zip(
+                OWN_TOPICS, self._own_publishers, strict=True)},
+            diagnostics=diagnostics.topic_name)
 
     def _subscribe(self) -> None:
         for name, kind in TOPICS.items():

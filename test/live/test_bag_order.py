@@ -57,3 +57,4 @@ def test_order_gives_way_to_memory(converted, monkeypatch):
     assert sum(held) == 27000
     whole = [time for _, time, _ in bag_reader.messages(converted, lambda *_: True)]
     assert len(whole) == 27000
+    assert whole != sorted(whole)  # the limit was felt: no more than it waited
