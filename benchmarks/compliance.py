@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 STEPS = {
-    'mesh, near field, patterns': ('infinite_tabulate', 'HalfSpaceSolver'),
-    'waves and ray elements': ('infinite_solver', 'RayElements.matrices'),
-    'assembly of scalar entries': ('infinite_solver', '_Pattern.entries'),
-    'sparse factors and residual': ('infinite_solver', '_solve'),
-    'rational fits': ('infinite_tabulate', 'fit_rational'),
+    'mesh, near field, patterns': ('elements_tabulate', 'HalfSpaceSolver'),
+    'waves and ray elements': ('elements_solver', 'RayElements.matrices'),
+    'assembly of scalar entries': ('elements_solver', '_Pattern.entries'),
+    'sparse factors and residual': ('elements_solver', '_solve'),
+    'rational fits': ('elements_tabulate', 'fit_rational'),
 }
 
 
@@ -52,15 +52,18 @@ def measure(
 ) -> None:
     """Print what one table costs."""
     start = time.process_time()
-    from rotorsoil_ros.physics import infinite_solver, infinite_tabulate
-    from rotorsoil_ros.physics.infinite import InfiniteElementModel
-    from rotorsoil_ros.physics.soil import Circle, Soil
+    from rotorsoil_ros.ground.elements import (
+        solver as elements_solver,
+        tabulate as elements_tabulate,
+    )
+    from rotorsoil_ros.ground.half_space import InfiniteElementModel
+    from rotorsoil_ros.ground.soil import Circle, Soil
     imports = time.process_time() - start
 
     spent: defaultdict[str, float] = defaultdict(float)
-    rooms = {'infinite_solver': infinite_solver, 'infinite_tabulate': infinite_tabulate}
+    rooms = {'elements_solver': elements_solver, 'elements_tabulate': elements_tabulate}
     start = time.process_time()
-    table = tabulate(infinite_tabulate, geometry, poisson_ratio, loss_factor, a0_min, a0_max)
+    table = tabulate(elements_tabulate, geometry, poisson_ratio, loss_factor, a0_min, a0_max)
     seconds = time.process_time() - start
     megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
@@ -68,7 +71,7 @@ def measure(
     for step, (room, path) in STEPS.items():
         _clock(rooms[room], path, step, spent)
     start = time.process_time()
-    tabulate(infinite_tabulate, geometry, poisson_ratio, loss_factor, a0_min, a0_max)
+    tabulate(elements_tabulate, geometry, poisson_ratio, loss_factor, a0_min, a0_max)
     again = time.process_time() - start
 
     print(f'{geometry}: nu = {poisson_ratio:g}, eta = {loss_factor:g}, '

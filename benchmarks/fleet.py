@@ -28,7 +28,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from rotorsoil_ros.live.loading import load_all
+from rotorsoil_ros.case.loading import load_all
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 POISSON_RATIOS = (0.25, 0.35, 0.45)
@@ -144,7 +144,7 @@ def bare(names: list[str], directory: Path) -> list[str]:
 
 def ours(names: list[str], directory: Path) -> list[str]:
     """Return the command of the node that watches these machines."""
-    command = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args',
+    command = [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args',
                '-p', f'machines:=[{",".join(names)}]', '-p', 'speed_reliability:=reliable',
                '-p', 'speed_depth:=100', '-p', f'cache:={directory / "cache"}']
     for name in names:

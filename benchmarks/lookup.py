@@ -15,11 +15,11 @@ import time
 
 import numpy as np
 
-from rotorsoil_ros.live.machine import Machine
-from rotorsoil_ros.live.predict import predict
-from rotorsoil_ros.live.profile import write_speed_profile
-from rotorsoil_ros.physics.band import ResponseBand, SoilSpread
-from rotorsoil_ros.physics.cone import ConeModel
+from rotorsoil_ros.bags.predict import predict
+from rotorsoil_ros.bags.profile import write_speed_profile
+from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.machine.band import ResponseBand, SoilSpread
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 SAMPLES = 200_000
@@ -72,7 +72,7 @@ def band(machine: Machine) -> None:
 def start_and_stop(directory: Path) -> None:
     """Print how long a node takes from a warm cache to active, and from SIGTERM to its end."""
     for log in ('', str(directory / 'log')):
-        command = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args',
+        command = [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args',
                    '-p', 'machines:=[paper_rotor]', '-p', f'paper_rotor.case:={CASE}',
                    '-p', f'cache:={directory}', *(['-p', f'log.directory:={log}'] if log else [])]
         start = time.perf_counter()

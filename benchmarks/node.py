@@ -245,7 +245,7 @@ def report(runs: dict[str, list[Figures]]) -> None:
 
 def commands(directory: Path) -> dict[str, list[str]]:
     """Return what is measured: the bare node, and ours with more and more of a log."""
-    ours = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args',
+    ours = [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args',
             '-p', 'machines:=[paper_rotor]', '-p', f'paper_rotor.case:={CASE}',
             '-p', 'speed_depth:=1000', '-p', f'cache:={directory / "cache"}']
     logged = [*ours, '-p', f'log.directory:={directory / "logs"}', '-p']

@@ -15,14 +15,15 @@ import time
 
 import numpy as np
 
-from rotorsoil_ros.physics.cone import ConeModel
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.dense import dense_response
-from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.modes import campbell, critical_speeds
-from rotorsoil_ros.physics.response import ResponseTable
-from rotorsoil_ros.physics.rotor import Bearing, Disc, Material, Rotor, ShaftSection
-from rotorsoil_ros.physics.soil import Rectangle, Soil
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.soil import Rectangle, Soil
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Rotor, ShaftSection
+
+from oracles.dense import dense_response
 
 LENGTH, DIAMETER = 0.76202, 0.020021
 SPEED_RANGE = (2.0 * math.pi, 300.0 * math.pi)

@@ -23,13 +23,13 @@ import time
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from rotorsoil_ros.case.criteria import criteria
-from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.inlets import Inlet, inlet, MEASURED_TOPICS, ROTOR_JOINT
-from rotorsoil_ros.live.machine import Machine
-from rotorsoil_ros.live.messages import Encoder, Messenger, pack_stamp, Topics
-from rotorsoil_ros.live.monitor import Monitor
-from rotorsoil_ros.live.run_log import LogSettings, RunLog
+from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.monitor.criteria import criteria
+from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.node.run_log import LogSettings, RunLog
+from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, ROTOR_JOINT
+from rotorsoil_ros.wire.messages import Encoder, Messenger, pack_stamp, Topics
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 RATE_HZ = 100

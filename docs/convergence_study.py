@@ -22,13 +22,13 @@ mpl.use('Agg')
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rotorsoil_ros.physics.errors import NotSolvedError
-from rotorsoil_ros.physics.infinite_mesh import Discretisation, discretisation_for
-from rotorsoil_ros.physics.infinite_table import entries_of, error_scale
-from rotorsoil_ros.physics.infinite_tabulate import exact_compliance, tabulate
+from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.elements.mesh import Discretisation, discretisation_for
+from rotorsoil_ros.ground.elements.table import entries_of, error_scale
+from rotorsoil_ros.ground.elements.tabulate import exact_compliance, tabulate
 
 HERE = Path(__file__).resolve().parent
-REFERENCE = HERE.parents[1] / 'shared' / 'reference' / 'soil'
+REFERENCE = HERE.parent / 'test' / 'reference' / 'soil'
 PICTURES = HERE / 'pictures'
 
 # Sixteen elements around the edge, 14 rings of ratio 1/2, cells half as large and a wider box.
@@ -57,7 +57,7 @@ described in `physics/infinite_element.py` and `physics/infinite_mesh.py`.
 ## Against the rigorous half-space
 
 The whole way, table and interpolation included, against the wavenumber solutions in
-`shared/reference/soil` at all their frequencies, a0 = 0.05 to 6 (they are good to 0.02 %).
+`test/reference/soil` at all their frequencies, a0 = 0.05 to 6 (they are good to 0.02 %).
 
 {rigorous}
 

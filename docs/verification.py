@@ -23,36 +23,36 @@ from unittest import mock
 import numpy as np
 import scipy.linalg
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'physics'))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'case'))
+sys.path.extend(str(Path(__file__).resolve().parents[1] / folder) for folder in (
+    '.', 'test', 'test/case', 'test/machine', 'test/rotor'))
 
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.ross import read
 from rotorsoil_ros.case.writer import text_of
-from rotorsoil_ros.physics import beam
-from rotorsoil_ros.physics.cone import ConeModel
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.modes import campbell, critical_speeds
-from rotorsoil_ros.physics.rotor import Disc, Material, Rotor, ShaftSection
-from rotorsoil_ros.physics.soil import Rectangle, RigidSoil, Soil
-from rotorsoil_ros.physics.units import hz_to_rad_s, rad_s_to_hz, rpm_to_rad_s
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.soil import Rectangle, RigidSoil, Soil
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.rotor import beam
+from rotorsoil_ros.rotor.assembly import Disc, Material, Rotor, ShaftSection
+from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rpm_to_rad_s
 
 import machines
+import test_assembly
 import test_coupled
 import test_ross
-import test_rotor
 
 PAGE = Path(__file__).with_suffix('.md')
-REFERENCE = machines.SHARED / 'reference' / 'rotor'
+REFERENCE = machines.REFERENCE / 'rotor'
 IMPACT = 'ross_Q1_shared_mf42_n0rpm_0-150Hz.csv'
 HEAD = """\
 # Verification of the rotor
 
 Written by `python docs/verification.py`; do not edit. Every benchmark of
-`shared/reference/rotor` and the ROSS files of `test/case/ross`: what is expected, what comes out,
+`test/reference/rotor` and the ROSS files of `test/reference/ross`: what is expected, what comes
+out,
 and how far apart they are. Tolerances are those of the benchmarks; deviations are relative.
 """
 
@@ -86,7 +86,7 @@ def _modes(rotor: Rotor, speed_rpm: float, count: int) -> np.ndarray:
 
 def _euler(given: dict) -> np.ndarray:
     stiffness, mass, polar = (one.copy() for one in
-                              test_rotor.pinned_shaft(given).plane_matrices)
+                              test_assembly.pinned_shaft(given).plane_matrices)
     mass -= 0.5 * polar  # rotary inertia, which Euler and Bernoulli leave out
     for row in (0, -2):
         stiffness[row, row] += 1e13
@@ -96,7 +96,7 @@ def _euler(given: dict) -> np.ndarray:
 
 def _pinned(given: dict) -> np.ndarray:
     speed = rpm_to_rad_s(given.get('speed_rpm', 0.0))
-    found = test_rotor.whirl_frequencies(test_rotor.pinned_shaft(given), speed, 6)
+    found = test_assembly.whirl_frequencies(test_assembly.pinned_shaft(given), speed, 6)
     return rad_s_to_hz(found if speed else found[::2])
 
 
@@ -138,7 +138,7 @@ def _cone_static(given: dict) -> np.ndarray:
 
 
 def _three_discs(given: dict) -> np.ndarray:
-    rotor = test_rotor.lalanne_ferraris(given, given['cxx'], given['czz'])
+    rotor = test_assembly.lalanne_ferraris(given, given['cxx'], given['czz'])
     return rad_s_to_hz(np.abs(_modes(rotor, 25000.0, 12).imag))
 
 
@@ -146,7 +146,7 @@ def _aster(given: dict) -> np.ndarray:
     base = _cases()['LF_3disc_25000rpm']['inputs']
     # Their spin takes y into z, ours z into x: their y is our z, their z our x.
     turned = {**base, 'kxx': given['kzz'], 'kzz': given['kyy']}
-    model = CoupledModel(test_rotor.lalanne_ferraris(turned, given['czz'], given['cyy']))
+    model = CoupledModel(test_assembly.lalanne_ferraris(turned, given['czz'], given['cyy']))
     found = model.unbalance_response(np.array([rpm_to_rad_s(given['speed_rpm'])]),
                                      np.array([0.0, given['me'], 0.0]))
     y, z = (test_coupled.channel(model, found, f'disc_2_{axis}')[0] for axis in 'zx')
@@ -154,11 +154,11 @@ def _aster(given: dict) -> np.ndarray:
 
 
 def _friswell(stiffness: object, speed_rpm: float) -> Callable[[dict], np.ndarray]:
-    return lambda given: np.abs(_modes(test_rotor.friswell(given, stiffness), speed_rpm, 8))
+    return lambda given: np.abs(_modes(test_assembly.friswell(given, stiffness), speed_rpm, 8))
 
 
 def _ross_probe(given: dict) -> np.ndarray:
-    rotor = test_rotor.friswell(given, np.diag([given['kxx'], given['kyy']]))
+    rotor = test_assembly.friswell(given, np.diag([given['kxx'], given['kyy']]))
     rotor = Rotor(0.0, rotor.shaft, (*rotor.discs, Disc('end', 0.0, 0.0, 0.0, 0.0)),
                   rotor.bearings)
     model = CoupledModel(rotor)
@@ -264,7 +264,7 @@ def _impact() -> Sweep:
 def imports() -> Iterator[Finding]:
     """Yield what ROSS 2.3.0 computed of the rotors that `import-ross` brings over."""
     hollow, extras = (_imported(name) for name in ('hollow', 'extras'))
-    source = '`Rotor.{}` of ROSS 2.3.0, file `test/case/ross/{}.toml`'
+    source = '`Rotor.{}` of ROSS 2.3.0, file `test/reference/ross/{}.toml`'
     for name, model, speed, expected in (
             ('hollow', hollow, 500.0, test_ross.HOLLOW_AT_500),
             ('extras', extras, 300.0, test_ross.EXTRAS_AT_300)):

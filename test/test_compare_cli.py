@@ -12,20 +12,21 @@ import re
 import numpy as np
 import pytest
 
-from rotorsoil_ros.case.comparison import compare as judge, Rules, Verdict
-from rotorsoil_ros.case.comparison_plots import all_figures
+from rotorsoil_ros.bags.profile import import_run_up
+from rotorsoil_ros.bags.run import read_run, Reading
+from rotorsoil_ros.bags.synthetic import on_ground, Truth, write_synthetic
+from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.case.expectation import Expectation
-from rotorsoil_ros.case.identification import identify_case, Wanted
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.cli import main
-from rotorsoil_ros.live.bag_writer import LogFile
-from rotorsoil_ros.live.measured_log import read_run, Reading
-from rotorsoil_ros.live.messages import JOINT_STATE, JointStateWriter, Records
-from rotorsoil_ros.live.profile import import_run_up
-from rotorsoil_ros.live.synthetic import on_ground, Truth, write_synthetic
-from rotorsoil_ros.physics.errors import NotSolvedError
-from rotorsoil_ros.physics.units import rpm_to_rad_s
+from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.figures.comparison import all_figures
+from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.identification import identify_case, Wanted
+from rotorsoil_ros.monitor.rules import Rules
+from rotorsoil_ros.monitor.verdict import compare as judge, Verdict
+from rotorsoil_ros.units import rpm_to_rad_s
+from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
 
 ROOT = Path(__file__).parents[1]
 KIT = str(ROOT / 'config' / 'rk4_rotor_kit.yaml')
@@ -33,7 +34,7 @@ FAN = str(ROOT / 'config' / 'plant_fan.yaml')
 START_NS = 1_700_000_000_000_000_000
 SECOND = 1_000_000_000
 HOUSINGS = tuple(f'{end}_housing_{axis}' for end in ('drive_end', 'fan_end') for axis in 'xz')
-RUN_UP = ROOT.parent / 'shared' / 'measured' / 'rk4_runup_1x.csv'
+RUN_UP = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
 
 needs_run_up = pytest.mark.skipif(not RUN_UP.exists(), reason='measured run-up is not here')
 

@@ -9,7 +9,7 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.cli import demo, demo_comparison, main
-from rotorsoil_ros.physics.units import rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_rpm
 
 START = 1_790_000_000_000_000_000
 

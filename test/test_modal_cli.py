@@ -10,8 +10,8 @@ import pytest
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.cli import main
-from rotorsoil_ros.physics.modes import campbell, critical_speeds
-from rotorsoil_ros.physics.units import hz_to_rad_s, rpm_to_rad_s
+from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
 ROOT = Path(__file__).parents[1]
 PAPER = str(ROOT / 'config' / 'paper_rotor.yaml')

@@ -8,22 +8,21 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case import document, schema, stiffness_file
-from rotorsoil_ros.case.faults import Faults, message
-from rotorsoil_ros.case.rotor_entries import RotorEntries
-from rotorsoil_ros.case.unbalances import Unbalances
-from rotorsoil_ros.physics.arrays import ComplexArray
-from rotorsoil_ros.physics.band import SoilSpread
-from rotorsoil_ros.physics.compliance_table import ComplianceTable
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import InputError, RotorSoilError
-from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.infinite import a0_range
-from rotorsoil_ros.physics.infinite_table import require_kind
-from rotorsoil_ros.physics.rotor import Rotor
-from rotorsoil_ros.physics.soil import Circle, Contact, Rectangle, RigidSoil, Soil
-from rotorsoil_ros.physics.units import rpm_to_rad_s
-from rotorsoil_ros.physics.zones import ISO_10816_3, USUAL_GROUP, ZoneLimits
+from rotorsoil_ros.case.case_errors import Faults, message
+from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
+from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
+from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.ground.elements.table import require_kind
+from rotorsoil_ros.ground.half_space import a0_range
+from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle, RigidSoil, Soil
+from rotorsoil_ros.ground.table import ComplianceTable
+from rotorsoil_ros.machine.band import SoilSpread
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.units import rpm_to_rad_s
 
 
 @dataclass(frozen=True)

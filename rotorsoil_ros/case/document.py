@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.errors import InputError
 
 # A long case with bearing tables has a few thousand nodes in 50 kB; parsing takes 1 s per 250 kB.
 _LARGEST_BYTES = 256 * 1024

@@ -5,14 +5,14 @@ from pathlib import Path
 
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case, infinite_range
-from rotorsoil_ros.physics.compliance_table import ComplianceTable
-from rotorsoil_ros.physics.cone import ConeModel
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.infinite import a0_range, ALGORITHM, InfiniteElementModel
-from rotorsoil_ros.physics.infinite_table import DimensionlessTable
-from rotorsoil_ros.physics.response import ResponseTable, TOLERANCE
-from rotorsoil_ros.physics.soil import Contact, RigidSoil, Soil, SoilModel
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.elements.table import DimensionlessTable
+from rotorsoil_ros.ground.half_space import a0_range, ALGORITHM, InfiniteElementModel
+from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
+from rotorsoil_ros.ground.table import ComplianceTable
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 
 
 def coupled_model(case: Case, directory: Path) -> CoupledModel:

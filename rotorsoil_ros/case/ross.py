@@ -10,7 +10,7 @@ from typing import Any
 
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.ross_file import one_line, RossFile, Table
-from rotorsoil_ros.physics.units import rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_rpm
 
 _SPEED_RANGE_RPM = (0.0, 10_000.0)
 _SHAFT_HEIGHT = 1.0

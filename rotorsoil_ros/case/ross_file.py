@@ -8,7 +8,7 @@ import tomllib
 from typing import Any, TypeAlias
 
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.errors import InputError
 
 Table: TypeAlias = Mapping[str, Any]
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.physics.compliance_table import ComplianceTable, PASSIVITY, RECIPROCITY
-from rotorsoil_ros.physics.errors import InputError, RotorSoilError
-from rotorsoil_ros.physics.soil import DOFS
-from rotorsoil_ros.physics.units import hz_to_rad_s, rad_s_to_hz
+from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.ground.soil import DOFS
+from rotorsoil_ros.ground.table import ComplianceTable, PASSIVITY, RECIPROCITY
+from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz
 
 _FREQUENCIES = ('omega_rad_s', 'hz')
 _ENTRIES = {f'{row}{column}': (i, j) for i, row in enumerate(DOFS)

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.physics.errors import NotSolvedError
-from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.soil import DOFS, equivalent_radii, Rectangle, Soil, SoilModel
-from rotorsoil_ros.physics.units import rad_s_to_rpm
+from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.soil import DOFS, equivalent_radii, Rectangle, Soil, SoilModel
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.units import rad_s_to_rpm
 
 # What the design note measured of cones against rigorous solutions (soil_and_foundation.md, 1.2
 # and 1.3): beyond these they are off by more than a quarter.

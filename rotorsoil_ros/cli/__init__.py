@@ -8,7 +8,7 @@ import sys
 import warnings
 
 from rotorsoil_ros.cli.parser import parser
-from rotorsoil_ros.physics.errors import InputError, RotorSoilError
+from rotorsoil_ros.errors import InputError, RotorSoilError
 
 BAD_INPUT = 2
 INTERRUPTED = 130

@@ -1,20 +1,24 @@
 """Recorded profiles, answered offline or sent into the graph."""
 
 from argparse import Namespace
+import sys
 
+from rotorsoil_ros.case import config, document, ross, writer
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.cli.sweeps import opened
 
 
 def predict(arguments: Namespace) -> int:
     """Answer every speed of a profile and log it as the node would."""
-    from rotorsoil_ros.live.machine import Machine
-    from rotorsoil_ros.live.predict import predict as answer
+    from rotorsoil_ros.bags.predict import predict as answer
+    from rotorsoil_ros.case.loading import Machine
+    from rotorsoil_ros.screen import recorder
 
     machine = Machine.load(
         arguments.case, cache_directory=arguments.cache, overrides=arguments.overrides)
     with progress('predicting') as report:
-        answered = answer(machine, arguments.profile, arguments.output, rrd=arguments.rrd,
-                          progress=report)
+        answered = answer(machine, arguments.profile, arguments.output, progress=report,
+                          screen=arguments.rrd and recorder(arguments.rrd, machine))
     counts = ', '.join(f'{number} {reason}' for reason, number in answered.counts.items())
     print(f'{arguments.output}: {answered.machine}: {counts}')
     return 0
@@ -22,7 +26,7 @@ def predict(arguments: Namespace) -> int:
 
 def replay(arguments: Namespace) -> int:
     """Publish a recorded profile at its own timing, or faster or slower."""
-    from rotorsoil_ros.live.replay import replay as publish
+    from rotorsoil_ros.node.replay import replay as publish
 
     with progress('replaying') as report:
         published = publish(arguments.profile, rate=arguments.rate, progress=report)
@@ -32,9 +36,29 @@ def replay(arguments: Namespace) -> int:
 
 def recover(arguments: Namespace) -> int:
     """Save everything readable of a log whose writer was killed."""
-    from rotorsoil_ros.live.recover import recover as save
+    from rotorsoil_ros.bags.recover import recover as save
 
     with progress('recovering') as report:
         saved = save(arguments.broken, arguments.output, progress=report)
     print(f'{arguments.output}: {saved}')
+    return 0
+
+
+def import_ross(arguments: Namespace) -> int:
+    """Write the case of a rotor that ROSS saved, and tell what was assumed and what was lost."""
+    sweep = arguments.rpm
+    found = ross.read(arguments.rotor, None if sweep is None else (sweep.start, sweep.stop))
+    lost = found.lost or ['nothing']
+    comments = [f'Imported by rotorsoil import-ross from {arguments.rotor.name}.',
+                'ROSS x (horizontal) is our -x, its y (vertical) our z, its axis our y.',
+                'Assumed:', *(f'  {line}' for line in found.assumed),
+                'Not carried over:', *(f'  {line}' for line in lost)]
+    text = writer.text_of(found.content, comments)
+    # What is written has to load; a fault is told with the name of the source.
+    config.case_of(arguments.rotor, document.parse(text, source=str(arguments.rotor)))
+    with opened(arguments.output) as stream:
+        stream.write(text)
+    for kind, lines in (('assumed', found.assumed), ('not carried over', lost)):
+        for line in lines:
+            print(f'{kind}: {line}', file=sys.stderr)
     return 0

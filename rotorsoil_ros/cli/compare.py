@@ -11,24 +11,18 @@ import math
 from pathlib import Path
 
 from rotorsoil_ros.case import cache, models
-from rotorsoil_ros.case.comparison import compare as judge, Comparison, Rules, Run, Verdict
-from rotorsoil_ros.case.comparison_files import document, HEADER, rows
-from rotorsoil_ros.case.comparison_plots import all_figures
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.expectation import Expectation
-from rotorsoil_ros.case.report import (
-    channel_table,
-    exclusions,
-    page,
-    peak_table,
-    zone_table,
-)
+from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.physics.band import SoilSpread
-from rotorsoil_ros.physics.comparison import Matching
-from rotorsoil_ros.physics.errors import InputError, RotorSoilError
-from rotorsoil_ros.physics.units import rpm_to_rad_s
-from rotorsoil_ros.physics.zones import ISO_10816_3, USUAL_GROUP
+from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
+from rotorsoil_ros.figures.report import channel_table, exclusions, page, peak_table, zone_table
+from rotorsoil_ros.machine.band import SoilSpread
+from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.points import Matching
+from rotorsoil_ros.monitor.rules import Rules
+from rotorsoil_ros.monitor.verdict import compare as judge, Comparison, Run, Verdict
+from rotorsoil_ros.units import rpm_to_rad_s
 
 _VERDICT_FAILS = 1
 _DPI = 110
@@ -36,7 +30,7 @@ _DPI = 110
 
 def compare(arguments: Namespace) -> int:
     """Hold a log against its prediction; write tables, pictures and a report; print a verdict."""
-    from rotorsoil_ros.live.measured_log import read_run, Reading
+    from rotorsoil_ros.bags.run import read_run, Reading
 
     with progress('reading') as _:
         run = read_run(arguments.log, Reading(machine=arguments.machine or ''))
@@ -101,7 +95,7 @@ def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[st
         if arguments.write_case is not None:
             raise InputError('--write-case: needs --identify or --identify-unbalance')
         return
-    from rotorsoil_ros.case.identification import describe, identify_case, Wanted, write_case
+    from rotorsoil_ros.monitor.identification import describe, identify_case, Wanted, write_case
 
     if comparison.expectation is None:
         raise InputError('--identify: needs the CASE')

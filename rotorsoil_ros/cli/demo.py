@@ -16,19 +16,19 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.plots import all_figures, trend
 from rotorsoil_ros.cli.demo_comparison import demonstrate_comparison
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.live import bag_reader
-from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.profile import write_speed_profile
-from rotorsoil_ros.physics.arrays import FloatArray, IntArray
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import RotorSoilError
-from rotorsoil_ros.physics.response import ResponseTable
-from rotorsoil_ros.physics.units import rad_s_to_rpm, rpm_to_rad_s
+from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.figures.response import all_figures, trend
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 
 MACHINE = 'paper_rotor'
 
@@ -108,7 +108,7 @@ def _node(
     """Run the node while the body does; leave its words in node.log."""
     parameters = [f'machines:=[{MACHINE}]', f'{MACHINE}.case:={case}', f'log.directory:={out}',
                   f'cache:={directory}', 'speed_reliability:=reliable', 'speed_depth:=1000']
-    command = [sys.executable, '-m', 'rotorsoil_ros.live.node', '--ros-args']
+    command = [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args']
     for parameter in parameters:
         command += ['-p', parameter]
     with (out / 'node.log').open('w') as words:

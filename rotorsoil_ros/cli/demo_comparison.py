@@ -9,17 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorsoil_ros.case.comparison import compare as judge, Comparison, Rules
-from rotorsoil_ros.case.expectation import Expectation
-from rotorsoil_ros.case.identification import Identification, identify_case, Wanted
+from rotorsoil_ros.bags.predict import predict
+from rotorsoil_ros.bags.run import read_run, Reading
+from rotorsoil_ros.bags.synthetic import profile, Truth, write_synthetic
+from rotorsoil_ros.case.loading import Machine
 from rotorsoil_ros.cli.compare import compare
 from rotorsoil_ros.cli.parser import parser
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.live.events import NANOSECONDS
-from rotorsoil_ros.live.machine import Machine
-from rotorsoil_ros.live.measured_log import read_run, Reading
-from rotorsoil_ros.live.predict import predict
-from rotorsoil_ros.live.synthetic import profile, Truth, write_synthetic
+from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.identification import Identification, identify_case, Wanted
+from rotorsoil_ros.monitor.rules import Rules
+from rotorsoil_ros.monitor.verdict import compare as judge, Comparison
+from rotorsoil_ros.screen import recorder
 
 CASE, PLANE, SOIL = 'plant_fan', 'wheel', 'soil.shear_modulus'
 MACHINE = f'synthetic_{CASE}'  # its name in every topic and on the screen
@@ -51,7 +53,8 @@ def demonstrate_comparison(out: Path, directory: Path, *, start_ns: int) -> None
             write_synthetic(signals, MACHINE, machine.model, machine.case.unbalance,
                             truth=_TRUTH, start_ns=start_ns)
         with progress('answering') as report:
-            predict(machine, signals, log, rrd=recording, progress=report)
+            predict(machine, signals, log, progress=report,
+                    screen=recorder(recording, machine) if recording else None)
         verdict = _report(log, path, out, directory)
         with progress('identifying') as _:
             comparison = _compare(log, machine, directory)

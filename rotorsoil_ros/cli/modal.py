@@ -11,10 +11,10 @@ from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import opened, values
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import InputError, NotSolvedError
-from rotorsoil_ros.physics.modes import campbell as campbell_of, critical_speeds, CriticalSpeed
-from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
+from rotorsoil_ros.errors import InputError, NotSolvedError
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes import campbell as campbell_of, critical_speeds, CriticalSpeed
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
 
 def campbell(arguments: Namespace) -> int:

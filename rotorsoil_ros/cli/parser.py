@@ -180,7 +180,7 @@ def _add_modal_verbs(verbs: _Verbs) -> None:
 
 
 def _add_import_verbs(verbs: _Verbs) -> None:
-    ross = _verb(verbs, 'import-ross', 'importing:import_ross',
+    ross = _verb(verbs, 'import-ross', 'bags:import_ross',
                  'write the case of a rotor that ROSS saved as TOML', case=False)
     ross.add_argument('rotor', metavar='ROTOR.toml', type=Path, help='what Rotor.save wrote')
     ross.add_argument('-o', '--output', metavar='CASE.yaml', default='-',

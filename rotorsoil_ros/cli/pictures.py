@@ -12,16 +12,14 @@ import numpy as np
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.modal_plots import modal_figures
-from rotorsoil_ros.case.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
-from rotorsoil_ros.case.plots import all_figures, main_peaks
-from rotorsoil_ros.case.soil_plots import compliance_figure
-from rotorsoil_ros.case.study_plots import mass_ratios, polar
 from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import NotSolvedError, RotorSoilError
-from rotorsoil_ros.physics.response import ResponseTable
+from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
+from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
+from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.response import ResponseTable
 
 
 def plot(arguments: Namespace) -> int:

@@ -8,15 +8,15 @@ import time
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.peaks import resonances
 from rotorsoil_ros.case.summary import derived_quantities, undecided, warnings
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.physics.errors import NotSolvedError
-from rotorsoil_ros.physics.infinite import InfiniteElementModel
-from rotorsoil_ros.physics.modes import critical_speeds, CriticalSpeed
-from rotorsoil_ros.physics.response import ResponseTable
-from rotorsoil_ros.physics.soil import SoilModel
-from rotorsoil_ros.physics.units import rad_s_to_hz, rad_s_to_rpm
+from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.half_space import InfiniteElementModel
+from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.monitor.peaks import resonances
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Amplification factor below which a critical speed needs no margin (API 617).
 _FELT = 2.5

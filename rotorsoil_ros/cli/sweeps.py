@@ -8,16 +8,16 @@ from typing import TextIO
 
 import numpy as np
 
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.cli.parser import Sweep
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.physics.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.physics.coupled import CoupledModel
-from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.foundation import Foundation
-from rotorsoil_ros.physics.soil import DOFS, SoilModel
-from rotorsoil_ros.physics.units import hz_to_rad_s, rpm_to_rad_s
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.soil import DOFS, SoilModel
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
 # Rows computed together: bounds memory however long the sweep.
 _CHUNK = 4096

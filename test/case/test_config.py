@@ -8,9 +8,9 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model, soil_models
-from rotorsoil_ros.physics.cone import ConeModel
-from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.soil import Circle, Rectangle, RigidSoil
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
 NO_CACHE = Path('no cache is needed for cones')

@@ -3,7 +3,7 @@
 import pytest
 
 from rotorsoil_ros.case.document import override, parse, read
-from rotorsoil_ros.physics.errors import InputError
+from rotorsoil_ros.errors import InputError
 
 
 @pytest.mark.parametrize('text, value', [

@@ -8,9 +8,9 @@ import pytest
 
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.physics.bearing import SpeedTable
-from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.units import rpm_to_rad_s
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.units import rpm_to_rad_s
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
 NO_CACHE = Path('no cache is needed for cones')

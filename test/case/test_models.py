@@ -8,8 +8,8 @@ import pytest
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model, response_key, response_table
-from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.infinite import InfiniteElementModel
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.half_space import InfiniteElementModel
 
 PAPER = Path(__file__).resolve().parents[2] / 'config' / 'paper_rotor.yaml'
 ELEMENTS = 'support.model=infinite_elements'

@@ -1,25 +1,16 @@
-"""config/paper_rotor.yaml against the contract and the seed paper."""
+"""config/paper_rotor.yaml against the seed paper."""
 
 from pathlib import Path
-import re
 
 import numpy as np
 import pytest
 
-from rotorsoil_ros.case import document
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
-from rotorsoil_ros.physics.units import hz_to_rad_s
+from rotorsoil_ros.units import hz_to_rad_s
 
 PATH = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
 NO_CACHE = Path('no cache is needed for cones')
-CONTRACT = Path(__file__).resolve().parents[3] / 'shared' / 'design' / 'CONTRACT.md'
-
-
-@pytest.mark.skipif(not CONTRACT.exists(), reason=f'{CONTRACT} is not here')
-def test_it_is_the_example_of_the_contract():
-    [example] = re.findall(r'```yaml\n(.*?)```', CONTRACT.read_text(), re.DOTALL)
-    assert document.read(PATH) == document.parse(example, source='contract')
 
 
 def test_rotor_weighs_what_the_paper_prints_and_the_block_ten_times_that():

@@ -7,7 +7,7 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
-from rotorsoil_ros.physics.units import rad_s_to_rpm, rpm_to_rad_s
+from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 
 PATH = Path(__file__).parents[2] / 'config' / 'plant_fan.yaml'
 NO_CACHE = Path('no cache is needed for cones')

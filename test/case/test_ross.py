@@ -17,10 +17,10 @@ from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.ross import read
 from rotorsoil_ros.cli import main
-from rotorsoil_ros.physics.errors import InputError
-from rotorsoil_ros.physics.modes import campbell, critical_speeds
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.machine.modes import campbell, critical_speeds
 
-FILES = Path(__file__).parent / 'ross'
+FILES = Path(__file__).parents[1] / 'reference' / 'ross'
 NO_CACHE = Path('no cache is needed on a rigid support')
 HOLLOW_AT_500 = [
     -5.363399632192386 + 508.7018526938813j, -5.316344662377608 + 567.065846695789j,

@@ -1,0 +1,1 @@
+"""Logs in MCAP: written, read, mended, answered."""

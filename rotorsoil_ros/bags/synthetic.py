@@ -1,0 +1,181 @@
+"""What would sensors say of a machine whose soil and unbalance are known? Labelled synthetic."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.bags.writer import LogFile
+from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.machine.band import on_soils
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.time_domain import shake, Shaking
+from rotorsoil_ros.units import rpm_to_rad_s
+from rotorsoil_ros.wire.cdr import ARRAYS, IMU, STAMP, SYNTHETIC
+from rotorsoil_ros.wire.handlers import ROTOR_JOINT
+from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+
+GRAVITY = 9.81
+SPEED_RATE_HZ = 50.0
+SLICE_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """
+    What is put into synthetic signals.
+
+    Attributes
+    ----------
+    shear_modulus_factor : float
+        G of the ground over that of the case.
+    growth : float
+        By which share the unbalance grows, evenly from the first sample to the last.
+    noise : float
+        Standard deviation of the noise over the root mean square of each signal's vibration.
+    slowest_rpm, fastest_rpm : float
+        Between which the machine runs up, dwells, and coasts down.
+    ramp_s, dwell_s : float
+        How long each of the ramps and the dwell last.
+    rate_hz : float
+        Samples per second; it should be forty times the running frequency or more.
+    seed : int
+        Of the noise.
+
+    """
+
+    shear_modulus_factor: float = 0.7
+    growth: float = 0.4
+    noise: float = 0.05
+    slowest_rpm: float = 360.0
+    fastest_rpm: float = 1750.0
+    ramp_s: float = 30.0
+    dwell_s: float = 10.0
+    rate_hz: float = 1000.0
+    seed: int = 0
+
+
+def write_synthetic(
+    target: Path, machine: str, model: CoupledModel, unbalance: ComplexArray, *, truth: Truth,
+    start_ns: int,
+) -> None:
+    """
+    Write speed with angle, and raw acceleration of every housing, as an MCAP file.
+
+    Parameters
+    ----------
+    target : Path
+        File to write.
+    machine : str
+        Whose topics.
+    model : CoupledModel
+        The machine as its case has it.
+    unbalance : (p,) complex array
+        Of every disc at the beginning [kg m].
+    truth : Truth
+        How the ground and the unbalance differ from the case.
+    start_ns : int
+        Stamp of the first sample [ns].
+
+    Notes
+    -----
+    The route is another one than that of the predictions: equations of motion integrated in
+    time, sampled, with noise and gravity. Every message of a sensor has `synthetic` in its
+    frame.
+
+    """
+    time, speed = profile(truth)
+    moment = np.abs(unbalance) * (1.0 + truth.growth * time / time[-1])[:, None]
+    shaken = shake(on_ground(model, truth.shear_modulus_factor), time, speed, moment=moment,
+                   phase=np.asarray(np.angle(unbalance), dtype=float))
+    stamp_ns = start_ns + np.rint(time * NANOSECONDS).astype(np.int64)
+    random = np.random.default_rng(truth.seed)
+    sensors = [Sensor(machine, channel, _acceleration(channel, shaken, truth.noise, random))
+               for channel in shaken.channels]
+    every = max(1, round(truth.rate_hz / SPEED_RATE_HZ))
+    with LogFile(target) as log:
+        # In the order of time, as a recorder writes: readers live through the file.
+        for start in range(0, len(time), round(truth.rate_hz * SLICE_S)):
+            part = slice(start, start + round(truth.rate_hz * SLICE_S))
+            told = slice(start + -start % every, part.stop, every)
+            log.write(_speeds(machine, stamp_ns[told], speed[told], shaken.angle[told]))
+            for sensor in sensors:
+                log.write(sensor.records(stamp_ns, part))
+
+
+def profile(truth: Truth) -> tuple[FloatArray, FloatArray]:
+    """Return time [s] and speed [rad/s]: run-up, dwell, coast-down."""
+    total = 2.0 * truth.ramp_s + truth.dwell_s
+    time = np.arange(round(total * truth.rate_hz)) / truth.rate_hz
+    speed_rpm = np.interp(time, [0.0, truth.ramp_s, truth.ramp_s + truth.dwell_s, total], [
+        truth.slowest_rpm, truth.fastest_rpm, truth.fastest_rpm, truth.slowest_rpm])
+    return time, np.asarray(rpm_to_rad_s(speed_rpm))
+
+
+def on_ground(model: CoupledModel, factor: float) -> CoupledModel:
+    """Return a machine on ground whose shear modulus is multiplied by a factor."""
+    soils = [soil.soil for soil in model.soil_models if hasattr(soil, 'soil')]
+    if not soils:
+        return model
+    return on_soils(model, [replace(
+        soils[0], shear_modulus=factor * soils[0].shear_modulus)])[0]
+
+
+def _speeds(machine: str, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> Records:
+    values = np.full((len(speed), len(ARRAYS), 1), np.nan)
+    values[:, ARRAYS.index('velocity'), 0] = speed
+    values[:, ARRAYS.index('position'), 0] = angle
+    stamps = stamp_ns.tolist()
+    return Records(f'/{machine}/joint_states', JOINT_STATE, stamps,
+                   JointStateWriter([ROTOR_JOINT]).write(stamps, values))
+
+
+def _acceleration(
+    channel: str, shaken: Shaking, noise: float, random: np.random.Generator,
+) -> FloatArray:
+    """Return what a sensor feels along the axes of the machine, (n, 3) [m/s^2]."""
+    station = channel.rpartition('_')[0]
+    felt = np.zeros((len(shaken.acceleration), 3))
+    for axis, column in (('x', 0), ('z', 2)):
+        clean = shaken.acceleration[:, shaken.channels.index(f'{station}_{axis}')]
+        deviation = noise * float(np.sqrt(np.mean(clean**2)))
+        felt[:, column] = clean + random.normal(scale=deviation, size=len(clean))
+    felt[:, 2] += GRAVITY
+    return felt
+
+
+class Sensor:
+    """Packs the messages of one sensor by the thousand."""
+
+    def __init__(self, machine: str, channel: str, acceleration: FloatArray) -> None:
+        self._topic = f'/{machine}/measured/{channel}/imu'
+        self._acceleration = acceleration
+        frame = f'{SYNTHETIC}_{channel}'
+        self._blank = np.frombuffer(serialize_message(_message(frame)), dtype=np.uint8)
+        marked = _message(frame)
+        marked.linear_acceleration.x = 1.0
+        mark = np.frombuffer(serialize_message(marked), dtype=np.uint8)
+        # Of a double 1.0 the last two bytes are not zero: there its first byte is found.
+        at = int(np.flatnonzero(self._blank != mark)[-1]) - 7
+        self._kind = np.dtype({
+            'names': ['sec', 'nanosec', 'acceleration'], 'formats': ['<i4', '<u4', '(3,)<f8'],
+            'offsets': [STAMP.start, STAMP.start + 4, at], 'itemsize': len(self._blank)})
+
+    def records(self, stamp_ns: IntArray, part: slice) -> Records:
+        """Return the messages of a part of the run."""
+        stamps = stamp_ns[part]
+        rows = np.tile(self._blank, (len(stamps), 1)).view(self._kind)[:, 0]
+        rows['sec'], rows['nanosec'] = np.divmod(stamps, NANOSECONDS)
+        rows['acceleration'] = self._acceleration[part]
+        return Records(self._topic, IMU, stamps.tolist(), [row.tobytes() for row in rows])
+
+
+def _message(frame: str) -> Imu:
+    message = Imu()
+    message.header.frame_id = frame
+    message.orientation_covariance[0] = -1.0  # not measured
+    message.angular_velocity_covariance[0] = -1.0
+    return message

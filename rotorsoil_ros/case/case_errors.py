@@ -1,0 +1,81 @@
+"""Where in a case file a fault lies, and how it is told in one line."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from rotorsoil_ros.case import schema
+from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.schema import Place
+from rotorsoil_ros.errors import InputError, RotorSoilError
+
+
+def message(path: Path, place: Place, problem: str) -> str:
+    """Return `file: key.path: problem`."""
+    steps = (str(step) for step in place)
+    words = (step if step.isidentifier() or step.isdigit() else shown(step) for step in steps)
+    return ': '.join(filter(None, (str(path), '.'.join(words), problem)))
+
+
+@dataclass(frozen=True)
+class Faults:
+    """
+    Says at which key of its file a document is refused.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    entries : schema.Document
+        What it says.
+
+    """
+
+    path: Path
+    entries: schema.Document
+
+    @contextmanager
+    def at(self, *place: int | str, entry: schema.Entry | None = None) -> Iterator[None]:
+        """Turn a refusal of the physics into an error at a key of the file."""
+        try:
+            yield
+        except InputError:
+            raise
+        except RotorSoilError as error:
+            # The physics says `mass must be ...` or `position of disc_1 must be ...`.
+            problem = str(error)
+            found = re.match(r'(\w+)(?: of (\w+)| about \w+)? must ', problem)
+            if found and found[2]:
+                place = (*self._station(found[2]), found[1])
+            elif found and entry is not None and found[1] in type(entry).model_fields:
+                place = (*place, found[1])
+                problem = problem.removeprefix(f'{found[1]} ')
+            raise self.error(*place, problem=problem) from error
+
+    def error(self, *place: int | str, problem: str) -> InputError:
+        """Return the error to raise at a key."""
+        return InputError(message(self.path, place, problem))
+
+    def refuse_repeated_names(self) -> None:
+        """Raise an InputError at the second of two stations of one name."""
+        seen: dict[str, Place] = {}
+        for place, name in self._stations():
+            if name in seen:
+                first = '.'.join(map(str, seen[name]))
+                raise self.error(*place, 'name', problem=f'must differ from that of {first}, '
+                                                         f'got {name} twice')
+            seen[name] = place
+
+    def _stations(self) -> list[tuple[Place, str]]:
+        rotor = self.entries.rotor
+        groups: list[tuple[Place, Sequence[schema.Foundation | schema.Disc | schema.Bearing
+                                           | schema.Probe]]] = [
+            (('foundations',), self.entries.foundations), (('rotor', 'discs'), rotor.discs),
+            (('rotor', 'bearings'), rotor.bearings), (('rotor', 'probes'), rotor.probes)]
+        return [((*group, index), entry.name) for group, entries in groups
+                for index, entry in enumerate(entries)]
+
+    def _station(self, name: str) -> Place:
+        return next((place for place, own in self._stations() if own == name), ('rotor',))

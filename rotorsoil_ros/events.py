@@ -1,0 +1,216 @@
+"""What can happen to a machine, in frozen words that every sink understands."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TypeAlias
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.prediction import Prediction
+
+NANOSECONDS = 1_000_000_000
+LAST_STAMP = (1 << 31) * NANOSECONDS - 1  # seconds of a stamp are an int32: until 2038
+
+
+class Level(IntEnum):
+    """How a machine is doing, in the numbers of diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """What a machine should do at each of n reported speeds: NaN where there is no answer."""
+
+    machine: str
+    stamp_ns: IntArray
+    prediction: Prediction
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """
+    One quantity of n measured 1X vectors.
+
+    Attributes
+    ----------
+    machine, quantity : str
+        Name of the machine; `amplitude` (zero-to-peak) or `phase` [rad].
+    stamp_ns : (n,) int array
+        When it was measured [ns].
+    channels : tuple of str
+        Where it was measured.
+    displacement, velocity : (n, channels) float array
+        Amplitude or phase of the displacement [m, rad] and of the velocity [m/s, rad/s];
+        NaN where it was not measured.
+
+    """
+
+    machine: str
+    quantity: str
+    stamp_ns: IntArray
+    channels: tuple[str, ...]
+    displacement: FloatArray
+    velocity: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """
+    Between which amplitudes the prediction lies, as far as the soil is known.
+
+    Attributes
+    ----------
+    machine : str
+        Name of the machine.
+    stamp_ns, speed : (n,) arrays
+        Of the speeds that it belongs to [ns], [rad/s].
+    low, high : (n, channels) float array
+        Displacement amplitude of every predicted channel, zero-to-peak [m, rad].
+
+    """
+
+    machine: str
+    stamp_ns: IntArray
+    speed: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Raw acceleration (n,) [m/s^2] of one channel at its stamps (n,) [ns]."""
+
+    machine: str
+    channel: str
+    stamp_ns: IntArray
+    acceleration: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Demodulated:
+    """
+    Displacement vectors of one channel that were found in its raw samples.
+
+    Attributes
+    ----------
+    machine, channel : str
+        Where.
+    stamp_ns, speed : (n,) arrays
+        Middle of each stretch of samples [ns], and the speed there [rad/s].
+    orders : tuple of int
+        Multiples of the speed, 1 first.
+    amplitude, phase : (n, orders) float array
+        Zero-to-peak [m], [rad]; phases are NaN where nothing tells the angle of the rotor.
+    deviation : (n,) float array
+        Standard error of the first order's amplitude [m].
+
+    """
+
+    machine: str
+    channel: str
+    stamp_ns: IntArray
+    speed: FloatArray
+    orders: tuple[int, ...]
+    amplitude: FloatArray
+    phase: FloatArray
+    deviation: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """
+    Measured once-per-turn vectors beside what was predicted for the speed at their stamps.
+
+    Attributes
+    ----------
+    machine : str
+        Name of the machine.
+    stamp_ns, speed : (n,) arrays
+        Of the measurement [ns]; told nearest to it [rad/s].
+    channels : tuple of str
+        Where; each of them is predicted.
+    amplitude, phase : (n, channels) float array
+        Measured, less runout where it is known [m, rad], [rad]; phases NaN where unknown.
+    deviation : (n, channels) float array
+        Standard error of the amplitude [m, rad], 0 where it is not known.
+    predicted : (n, channels) complex array
+        [m, rad]; NaN where the table has a gap.
+    low, high : (n, channels) float array
+        Band of the predicted amplitude, NaN where none is known.
+
+    """
+
+    machine: str
+    stamp_ns: IntArray
+    speed: FloatArray
+    channels: tuple[str, ...]
+    amplitude: FloatArray
+    phase: FloatArray
+    deviation: FloatArray
+    predicted: ComplexArray
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def residual(self) -> FloatArray:
+        """Amplitude of measured minus predicted, (n, channels) [m, rad]."""
+        measured = self.amplitude * np.exp(1j * self.phase)
+        return np.asarray(np.abs(measured - self.predicted))
+
+
+@dataclass(frozen=True, slots=True)
+class Zoned:
+    """In which zone (A, B, C, D) each housing channel is, predicted and measured."""
+
+    machine: str
+    stamp_ns: int
+    predicted: Mapping[str, str]
+    measured: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Something that a reader of the log should know happened at `stamp_ns`."""
+
+    machine: str
+    stamp_ns: int
+    level: Level
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostics:
+    """
+    Health of one machine: its level, one sentence, and values whose keys say their unit.
+
+    `parts` are the same of something that belongs to it, each under a name of its own.
+    """
+
+    machine: str
+    stamp_ns: int
+    level: Level
+    summary: str
+    values: Mapping[str, float | str]
+    name: str = ''
+    parts: tuple['Diagnostics', ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """What the predictions rest on from `stamp_ns` on."""
+
+    machine: str
+    stamp_ns: int
+    description: Mapping[str, object]
+
+
+Event: TypeAlias = (
+    Predicted | Measured | Band | Samples | Demodulated | Compared | Zoned | Remark | Diagnostics
+    | Model)
+Sink: TypeAlias = Callable[[Event], None]

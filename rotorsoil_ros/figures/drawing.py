@@ -1,0 +1,241 @@
+"""The machine of a case, drawn to scale from the side and from its end."""
+
+import math
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle as Round, Polygon, Rectangle as Box
+import numpy as np
+
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.ground.soil import Circle
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.rotor.assembly import Bearing, Disc
+
+STEEL, DISC, CONCRETE, SOIL = '#7d98b3', '#d9a441', '#c9c9c4', '#c8ad7f'
+HOUSING, STAND, SPRING = '#5b6770', '#a9a9a9', '#b03a2e'
+
+# A housing is drawn so many times as high and wide as the shaft in it, but not smaller than this
+# share of the shaft's height.
+_HOUSING = 1.9
+_LEAST_HOUSING = 0.09
+# Labels of discs closer than this share of the view would touch.
+_CLOSE = 0.16
+# Points between a disc and its label, and where another label is in between.
+_BESIDE, _ABOVE = 4, 26
+# Windings of a pedestal's spring.
+_WINDINGS = 4
+_EDGE: dict[str, Any] = {'edgecolor': 'black', 'linewidth': 0.6}
+_MEGA = 1e-6
+
+
+def machine_drawing(case: Case) -> Figure:
+    """Draw shaft, discs, bearings, blocks and ground of a case, side and end view."""
+    left, right, reach, top = _extent(case)
+    # Room for the labels of discs above, and of bearings to the right.
+    depth = 0.1 * top
+    across, up = right - left + 2.0 * reach, top + depth
+    figure = Figure(figsize=(7.5, min(max(1.9 + 6.2 * up / across, 2.9), 7.4)),
+                    layout='constrained')
+    # Widths in the ratio of the limits: then both views have one scale.
+    side, end = figure.subplots(1, 2, width_ratios=[right - left, 2.0 * reach], sharey=True)
+    side.set(xlim=(left, right), ylim=(-depth, top), xlabel='y along the shaft [m]',
+             ylabel='z above the ground [m]')
+    end.set(xlim=(-reach, reach), xlabel='x across [m]')
+    _draw_side(side, case)
+    _draw_end(end, case)
+    for axes in (side, end):
+        axes.set_aspect('equal')
+        axes.locator_params(axis='x', nbins=6 if axes is side else 3)
+        axes.spines[['top', 'right']].set_visible(False)
+        _draw_ground(axes, rigid=case.support.model == 'rigid')
+    given = all(block.height is not None for block in case.foundations)
+    note = '' if given else ', heights of blocks after their centre of gravity'
+    figure.suptitle(f'{case.name}: {_support(case)}\nto scale, discs as solid cylinders of their '
+                    f'mass and inertia{note};\nbearings and pedestals schematic', fontsize=9)
+    return figure
+
+
+def _extent(case: Case) -> tuple[float, float, float, float]:
+    """Return the left and right end of the side view, half the end view, and the top [m]."""
+    rotor = case.rotor
+    radius = max([_cylinder(disc)[0] for disc in rotor.discs], default=0.0)
+    top = rotor.shaft_height + radius
+    ends, reach = [0.0, rotor.length], max(radius, 0.35 * rotor.shaft_height)
+    for block in case.foundations:
+        ends += [block.centre_y - _half_length(block), block.centre_y + _half_length(block)]
+        reach = max(reach, _half_width(block))
+    edge = 0.05 * (max(ends) - min(ends))
+    return min(ends) - edge, max(ends) + edge, reach + edge, top + 3.0 * edge
+
+
+def _support(case: Case) -> str:
+    if case.support.model == 'table':
+        return 'ground as its file says'
+    if case.soil is None or case.support.model == 'rigid':
+        return 'rigid ground'
+    return (f'{case.support.model.replace("_", " ")} on soil of G = '
+            f'{1e-6 * case.soil.shear_modulus:g} MPa, c_s = '
+            f'{case.soil.shear_wave_speed:.0f} m/s')
+
+
+def _draw_side(axes: Axes, case: Case) -> None:
+    rotor, shaft = case.rotor, case.rotor.shaft_height
+    for block in case.foundations:
+        half, height = _half_length(block), block.drawn_height
+        axes.add_patch(Box((block.centre_y - half, 0.0), 2.0 * half, height, zorder=1,
+                           facecolor=CONCRETE, **_EDGE))
+        axes.annotate(f'{block.name}, {block.mass:g} kg', (block.centre_y, 0.5 * height),
+                      ha='center', va='center', fontsize=7)
+    for bearing in rotor.bearings:
+        size = _housing_size(case, bearing)
+        foot = _foot(case, bearing)
+        _draw_support(axes, bearing, bearing.position, width=size, foot=foot, shaft=shaft,
+                      size=size)
+        # At the foot: clear of the discs above and of the block's name.
+        axes.annotate(_words(bearing), (bearing.position + 0.5 * size, foot), xytext=(3, 4),
+                      textcoords='offset points', fontsize=6.5, va='bottom', zorder=7)
+    _draw_shaft(axes, case)
+    _draw_discs(axes, case)
+    for probe in rotor.probes:
+        axes.plot(probe.position, shaft, 'v', color='crimson', markersize=5, zorder=5)
+        _label(axes, probe.name, probe.position, shaft, points=_BESIDE)
+
+
+def _draw_shaft(axes: Axes, case: Case) -> None:
+    start, shaft = 0.0, case.rotor.shaft_height
+    for section in case.rotor.shaft:
+        (left, right), stop = section.outer_diameter, start + section.length
+        axes.add_patch(Polygon(
+            [(start, shaft - left / 2), (stop, shaft - right / 2), (stop, shaft + right / 2),
+             (start, shaft + left / 2)], zorder=3, facecolor=STEEL, **_EDGE))
+        start = stop
+
+
+def _draw_discs(axes: Axes, case: Case) -> None:
+    rotor, shaft = case.rotor, case.rotor.shaft_height
+    left, right = axes.get_xlim()
+    before, raised, close = None, False, _CLOSE * (right - left)
+    for disc in sorted(rotor.discs, key=lambda disc: disc.position):
+        radius, thickness = _cylinder(disc)
+        thickness = max(thickness, 0.008 * rotor.length)
+        axes.add_patch(Box((disc.position - thickness / 2, shaft - radius), thickness,
+                           2.0 * radius, zorder=4, facecolor=DISC, **_EDGE))
+        # Of two close ones the second says it higher up.
+        raised = before is not None and not raised and disc.position - before < close
+        _label(axes, f'{disc.name}\n{disc.mass:.4g} kg', disc.position, shaft + radius,
+               points=_ABOVE if raised else _BESIDE)
+        before = disc.position
+
+
+def _draw_end(axes: Axes, case: Case) -> None:
+    shaft = case.rotor.shaft_height
+    for block in case.foundations:
+        half = _half_width(block)
+        axes.add_patch(Box((-half, 0.0), 2.0 * half, block.drawn_height, zorder=1,
+                           facecolor=CONCRETE, **_EDGE))
+    # One behind the other: the one that shows most stands for all.
+    flexible = [bearing for bearing in case.rotor.bearings if bearing.pedestal is not None]
+    for bearing in (flexible or list(case.rotor.bearings))[:1]:
+        size, foot = _housing_size(case, bearing), _foot(case, bearing)
+        _draw_support(axes, bearing, 0.0, width=max(size, 0.5 * (shaft - foot)), foot=foot,
+                      shaft=shaft, size=size)
+    for disc in case.rotor.discs:
+        axes.add_patch(Round((0.0, shaft), _cylinder(disc)[0], zorder=3, facecolor=DISC,
+                             alpha=0.5, **_EDGE))
+    diameter = max(max(section.outer_diameter) for section in case.rotor.shaft)
+    axes.add_patch(Round((0.0, shaft), diameter / 2, zorder=4, facecolor=STEEL, **_EDGE))
+
+
+def _draw_support(
+    axes: Axes, bearing: Bearing, centre: float, *, width: float, foot: float, shaft: float,
+    size: float,
+) -> None:
+    """Draw a housing about the shaft on a stand, or on a spring and a dashpot beside it."""
+    under = shaft - 0.5 * size
+    axes.add_patch(Box((centre - 0.5 * size, under), size, size, zorder=2.5, facecolor=HOUSING,
+                       **_EDGE))
+    if bearing.pedestal is None:
+        axes.add_patch(Polygon(
+            [(centre - 0.5 * width, foot), (centre + 0.5 * width, foot),
+             (centre + 0.3 * size, under), (centre - 0.3 * size, under)], zorder=2,
+            facecolor=STAND, **_EDGE))
+        return
+    plate = 0.06 * (under - foot)
+    axes.add_patch(Box((centre - 0.5 * width, foot), width, plate, zorder=2, facecolor=HOUSING,
+                       **_EDGE))
+    line: dict[str, Any] = {'color': SPRING, 'linewidth': 1.3, 'zorder': 2.2}
+    # A zigzag between two straight ends on the left, a piston in its cylinder on the right.
+    height = under - foot - plate
+    share = np.concatenate([[0.0], np.linspace(0.15, 0.85, 2 * _WINDINGS + 1), [1.0]])
+    swing = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], _WINDINGS)[:-1], [0.0, 0.0, 0.0]])
+    axes.plot(centre - 0.25 * size + 0.16 * size * swing[:len(share)],
+              foot + plate + share * height, **line)
+    right, low, high = centre + 0.27 * size, foot + plate + 0.3 * height, foot + plate + (
+        0.7 * height)
+    axes.plot([right, right], [foot + plate, low], **line)
+    axes.plot([right - 0.13 * size] * 2 + [right + 0.13 * size] * 2, [high, low, low, high],
+              **line)
+    axes.plot([right, right], [0.5 * (low + high), under], **line)
+    axes.plot([right - 0.1 * size, right + 0.1 * size], [0.5 * (low + high)] * 2, **line)
+
+
+def _words(bearing: Bearing) -> str:
+    """Return the name of a bearing and what is known of its pedestal."""
+    pedestal = bearing.pedestal
+    if pedestal is None:
+        return bearing.name
+    (x, z), (across, up) = np.diag(pedestal.mass), np.diag(pedestal.stiffness)
+    mass = f'{x:.3g} kg' if x == z else f'{x:.3g} (x), {z:.3g} kg (z)'
+    return (f'{bearing.name}\npedestal: {mass}\n{_MEGA * across:.3g} (x), {_MEGA * up:.3g} (z) '
+            'N/um')
+
+
+def _housing_size(case: Case, bearing: Bearing) -> float:
+    """Return height and width of a housing [m]."""
+    ends = np.cumsum([0.0, *(section.length for section in case.rotor.shaft)])
+    index = int(np.clip(np.searchsorted(ends, bearing.position) - 1, 0, len(ends) - 2))
+    diameter = max(case.rotor.shaft[index].outer_diameter)
+    return max(_HOUSING * diameter, _LEAST_HOUSING * case.rotor.shaft_height)
+
+
+def _draw_ground(axes: Axes, *, rigid: bool) -> None:
+    left, right = axes.get_xlim()
+    bottom = axes.get_ylim()[0]
+    axes.add_patch(Box((left, bottom), right - left, -bottom, zorder=0, linewidth=0.0,
+                       facecolor='#999999' if rigid else SOIL, hatch='///' if rigid else '...',
+                       edgecolor='white'))
+    axes.axhline(0.0, color='black', linewidth=0.8, zorder=1)
+
+
+def _label(axes: Axes, text: str, along: float, height: float, *, points: int) -> None:
+    leader = {'arrowstyle': '-', 'linewidth': 0.5} if points > _BESIDE else None
+    axes.annotate(text, (along, height), xytext=(0, points), fontsize=7, zorder=6,
+                  arrowprops=leader,
+                  textcoords='offset points', ha='center', va='bottom')
+
+
+def _foot(case: Case, bearing: Bearing) -> float:
+    """Return the height of what a bearing stands on [m]."""
+    return next((block.drawn_height for block in case.foundations
+                 if block.name == bearing.foundation), 0.0)
+
+
+def _half_width(block: Foundation) -> float:
+    contact = block.contact
+    return contact.radius if isinstance(contact, Circle) else contact.half_width
+
+
+def _half_length(block: Foundation) -> float:
+    contact = block.contact
+    return contact.radius if isinstance(contact, Circle) else contact.half_length
+
+
+def _cylinder(disc: Disc) -> tuple[float, float]:
+    """Return radius and thickness of the solid cylinder with the mass and inertia of a disc."""
+    if not disc.mass > 0.0:
+        return 0.0, 0.0
+    square = 2.0 * disc.polar_inertia / disc.mass
+    thickness = 12.0 * disc.diametral_inertia / disc.mass - 3.0 * square
+    return math.sqrt(square), float(np.sqrt(max(thickness, 0.0)))

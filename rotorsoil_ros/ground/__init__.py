@@ -1,0 +1,1 @@
+"""What carries the machine: soil under a contact, massless, at every frequency."""

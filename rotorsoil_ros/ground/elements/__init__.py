@@ -1,0 +1,1 @@
+"""Finite elements near the contact, infinite elements with exponential decay beyond."""

@@ -1,0 +1,69 @@
+"""The same support on another soil, without solving the soil again."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.half_space import InfiniteElementModel
+from rotorsoil_ros.ground.soil import Contact, Soil, SoilModel
+
+
+@dataclass(frozen=True, slots=True)
+class NeighbourSoil:
+    """
+    Infinite elements on a soil that differs a little from the one they were solved for.
+
+    Attributes
+    ----------
+    solved : InfiniteElementModel
+        Its table's Poisson's ratio, everything else of the neighbour.
+    poisson_ratio : float
+        nu of the neighbour [-].
+
+    Notes
+    -----
+    G and rho are a rescaling, and eta is another point of the same analytic function: both are
+    exact. For nu the compliance is scaled by S N S, where S squared is the ratio of the static
+    compliances of a disc, (2 - nu) for sliding, (1 - nu) for heaving and rocking, 1 for torsion:
+    exact at rest for a disc, and passive at every frequency. What is left out is the change of
+    the speed of pressure waves.
+
+    Below the frequencies of a table, which a stiffer soil can reach, its lowest one stands.
+
+    """
+
+    solved: InfiniteElementModel
+    poisson_ratio: float
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
+        before, after = self.solved.soil.poisson_ratio, self.poisson_ratio
+        sliding = (2.0 - after) / (2.0 - before)
+        heaving = (1.0 - after) / (1.0 - before)
+        scale = np.sqrt([sliding, sliding, heaving, heaving, heaving, 1.0])
+        omega = np.maximum(omega, self.solved.omega_range[0])
+        return np.asarray(self.solved.compliance(omega) * np.outer(scale, scale))
+
+
+def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
+    """
+    Return a model of the same kind as a given one on another soil.
+
+    Raises
+    ------
+    RotorSoilError
+        If the model does not know of a soil: a rigid base or a table from a file.
+
+    """
+    match model:
+        case ConeModel():
+            return ConeModel(soil, contact)
+        case InfiniteElementModel(table=table):
+            as_solved = replace(soil, poisson_ratio=table.poisson_ratio)
+            table = replace(table, loss_factor=soil.loss_factor)
+            return NeighbourSoil(InfiniteElementModel(as_solved, contact, table),
+                                 soil.poisson_ratio)
+    raise RotorSoilError(f'a support of type {type(model).__name__} does not depend on the soil')

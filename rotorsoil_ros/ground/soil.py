@@ -1,0 +1,168 @@
+"""What the ground is, where it is touched, and what every model of it must answer."""
+
+from dataclasses import dataclass
+import math
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.errors import require
+
+DOFS = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+
+
+@dataclass(frozen=True, slots=True)
+class Soil:
+    """
+    Homogeneous isotropic half-space with hysteretic damping.
+
+    Attributes
+    ----------
+    shear_modulus : float
+        G [Pa].
+    poisson_ratio : float
+        nu, 0 <= nu < 0.5 [-].
+    density : float
+        rho [kg/m^3].
+    loss_factor : float
+        eta >= 0 [-]: every modulus is multiplied by (1 + i eta); eta is twice the damping ratio.
+
+    """
+
+    shear_modulus: float
+    poisson_ratio: float
+    density: float
+    loss_factor: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(0.0 < self.shear_modulus < math.inf, 'shear_modulus', '> 0 Pa and finite',
+                self.shear_modulus)
+        require(0.0 <= self.poisson_ratio < 0.5, 'poisson_ratio', 'in [0, 0.5)',
+                self.poisson_ratio)
+        require(0.0 < self.density < math.inf, 'density', '> 0 kg/m^3 and finite', self.density)
+        require(0.0 <= self.loss_factor < 1.0, 'loss_factor', 'in [0, 1)', self.loss_factor)
+
+    @property
+    def shear_wave_speed(self) -> float:
+        """Speed of shear waves without damping, sqrt(G / rho) [m/s]."""
+        return math.sqrt(self.shear_modulus / self.density)
+
+    @property
+    def pressure_wave_speed(self) -> float:
+        """Speed of dilatational waves without damping, c_s sqrt(2 (1 - nu) / (1 - 2 nu)) [m/s]."""
+        nu = self.poisson_ratio
+        return self.shear_wave_speed * math.sqrt(2.0 * (1.0 - nu) / (1.0 - 2.0 * nu))
+
+    @property
+    def complex_shear_modulus(self) -> complex:
+        """G (1 + i eta) [Pa]."""
+        return self.shear_modulus * (1.0 + 1j * self.loss_factor)
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """Rectangular contact of half-width b along x and half-length l along y [m]."""
+
+    half_width: float
+    half_length: float
+
+    def __post_init__(self) -> None:
+        require(0.0 < self.half_width < math.inf, 'half_width', '> 0 m and finite',
+                self.half_width)
+        require(0.0 < self.half_length < math.inf, 'half_length', '> 0 m and finite',
+                self.half_length)
+
+    @property
+    def area(self) -> float:
+        """Contact area, 4 b l [m^2]."""
+        return 4.0 * self.half_width * self.half_length
+
+    @property
+    def second_moments(self) -> tuple[float, float, float]:
+        """Second moments of area about x, y and z through the centre [m^4]."""
+        b, half_length = self.half_width, self.half_length
+        about_x = 4.0 * b * half_length**3 / 3.0
+        about_y = 4.0 * half_length * b**3 / 3.0
+        return about_x, about_y, about_x + about_y
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes a0 dimensionless: the half-width b [m]."""
+        return self.half_width
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """Circular contact of the given radius r0 [m]."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        require(0.0 < self.radius < math.inf, 'radius', '> 0 m and finite', self.radius)
+
+    @property
+    def area(self) -> float:
+        """Contact area, pi r0^2 [m^2]."""
+        return math.pi * self.radius**2
+
+    @property
+    def second_moments(self) -> tuple[float, float, float]:
+        """Second moments of area about x, y and z through the centre [m^4]."""
+        about_diameter = math.pi * self.radius**4 / 4.0
+        return about_diameter, about_diameter, 2.0 * about_diameter
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes a0 dimensionless: the radius r0 [m]."""
+        return self.radius
+
+
+Contact: TypeAlias = Rectangle | Circle
+
+
+def equivalent_radii(contact: Contact) -> FloatArray:
+    """
+    Return the radius of the disc that stands for the contact in each degree of freedom.
+
+    Parameters
+    ----------
+    contact : Contact
+        Area of contact between foundation and soil.
+
+    Returns
+    -------
+    (6,) float array
+        Radii [m] over (x, y, z, rx, ry, rz): equal area for the translations, equal second
+        moment of area about the axis of each rotation.
+
+    References
+    ----------
+    Wolf, Foundation Vibration Analysis Using Simple Physical Models (1994), sec. 2.1.
+
+    """
+    about_x, about_y, about_z = contact.second_moments
+    translation = math.sqrt(contact.area / math.pi)
+    return np.array([
+        translation, translation, translation,
+        (4.0 * about_x / math.pi) ** 0.25,
+        (4.0 * about_y / math.pi) ** 0.25,
+        (2.0 * about_z / math.pi) ** 0.25,
+    ])
+
+
+class SoilModel(Protocol):
+    """What everything above the soil knows of it."""
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class RigidSoil:
+    """Ground that does not move: the textbook support, as compliance zero."""
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return zeros, (n, 6, 6)."""
+        return np.zeros((*np.shape(omega), 6, 6), dtype=complex)

@@ -1,1 +1,0 @@
-"""Streams: the monitor, its messages, logs, viewer and node."""

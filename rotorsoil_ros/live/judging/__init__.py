@@ -1,1 +1,0 @@
-"""What is measured held against what is predicted, while the machine runs."""

@@ -1,1 +1,0 @@
-"""What an engineer sees: the parts of one screen for the rerun viewer."""

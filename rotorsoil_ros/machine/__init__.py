@@ -1,0 +1,1 @@
+"""Rotors on foundations on ground, solved together: response and modes."""

@@ -1,0 +1,311 @@
+"""Complex frequencies at which rotor, bearings and support vibrate without a force."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.rotor.whirl import ORBITS
+
+# Frequencies w = lambda / i with less real part than this share of |w| do not vibrate: they
+# creep back, and a hysteretic soil alone gives such ones a little of it.
+_CREEPING = 0.2
+
+# A vibration with less damping than this is felt: its amplification factor is above 2.5.
+_LIGHT = 0.2
+
+# Newton's iteration stops at this relative step, whose square is the error left.
+_CONVERGED = 1e-6
+_ITERATIONS = 12
+
+# A guess that moves farther, relative to itself, was hardly one of this mode.
+_NEAR_GUESS = 0.05
+
+# Two vectors are one from this cosine on, at frequencies equal within the steps.
+_SAME = 0.999
+
+# Share of the compliance that guesses may neglect.
+_ROUGH = 1e-4
+
+
+@dataclass(frozen=True)
+class FreeVibration:
+    """
+    Machine at some speeds, in units in which every nominal bearing spring is one.
+
+    Attributes
+    ----------
+    inverse : (n, 2 r) float array
+        1 / omega of the rotor's forward whirl modes on nominal springs [s].
+    journals : (n, b, 2 r) float array
+        Their deflection at the bearings.
+    stiffness, damping : (n, 2 b, 2 b) float array
+        Of the bearings over (x, z) of each.
+    rows : (2 b, s) float array
+        Housing motion per motion of the support.
+    mass : (s, s) float array
+        Of the support.
+    compliance : Continuation
+        Of the support without its mass.
+    highest : float
+        Frequency up to which modes are looked for [rad/s].
+    reach : float
+        Rotor modes up to this many times `highest` are unknowns of their own.
+
+    """
+
+    inverse: FloatArray
+    journals: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    rows: FloatArray
+    mass: FloatArray
+    compliance: Continuation
+    highest: float
+    reach: float
+
+    @cached_property
+    def _modes(self) -> tuple[FloatArray, ComplexArray]:
+        """Inverse frequencies (n, m) and journal orbits (n, 2 b, m), forward then backward."""
+        both = np.concatenate([self.inverse, -self.inverse], axis=1)
+        orbits = np.concatenate([self.journals[:, :, None] * orbit[:, None]
+                                 for orbit in ORBITS], axis=-1)
+        return both, orbits.reshape(len(both), -1, both.shape[1])
+
+    @cached_property
+    def resonant(self) -> IntArray:
+        """Rotor modes that may resonate, (n, k): they are unknowns of their own."""
+        inverse, _ = self._modes
+        count = int((inverse * self.highest * self.reach > 1.0).sum(axis=1).max())
+        return np.argsort(-inverse, axis=1)[:, :count]
+
+    def _pick(self, modes: IntArray) -> tuple[FloatArray, ComplexArray]:
+        inverse, orbits = self._modes
+        return (np.take_along_axis(inverse, modes, axis=1),
+                np.take_along_axis(orbits, modes[:, None], axis=2))
+
+    @cached_property
+    def _residues(self) -> ComplexArray:
+        _, orbits = self._modes
+        pairs = orbits[:, :, None] * orbits[:, None].conj()
+        return pairs.reshape(len(pairs), -1, orbits.shape[2]).transpose(0, 2, 1)
+
+    def _gains(self, frequency: ComplexArray) -> ComplexArray:
+        """Return 1 / (1 - w / omega_k) of modes that cannot resonate, else 0, (n, p, m)."""
+        inverse, _ = self._modes
+        stiffness = 1.0 - frequency[..., None] * inverse[:, None]
+        np.put_along_axis(stiffness, self.resonant[:, None], np.inf, axis=2)
+        return np.asarray(1.0 / stiffness)
+
+    def _regular(self, frequency: ComplexArray) -> ComplexArray:
+        """Return the journals' receptance by those modes, (n, p, 2 b, 2 b)."""
+        ports = len(self.rows)
+        flat = self._gains(frequency) @ self._residues
+        return np.asarray(flat.reshape(*frequency.shape, ports, ports))
+
+    def matrix(self, frequency: ComplexArray) -> ComplexArray:
+        """
+        Return the matrix that is singular at an eigenvalue.
+
+        Parameters
+        ----------
+        frequency : (n, p) complex array
+            w = lambda / i [rad/s].
+
+        Returns
+        -------
+        (n, p, d, d) complex array
+            Over the forces g of the bearings beyond their nominal springs, the amplitudes p
+            of resonant rotor modes, and the motion z of the support.
+
+        """
+        inverse, orbits = self._pick(self.resonant)
+        _, ports, modes = orbits.shape
+        own = len(self.mass)
+        w = frequency[..., None, None]
+        one = np.eye(ports)
+        regular = self._regular(frequency)
+        extra = self.stiffness[:, None] + 1j * w * self.damping[:, None] - one
+        compliance = self.compliance(frequency)
+        # Gap between journal and housing, over the unknowns.
+        gap = np.concatenate([
+            -regular, np.broadcast_to(orbits[:, None], (*frequency.shape, ports, modes)),
+            (regular - one) @ self.rows], axis=-1)
+        through = gap + np.eye(ports, gap.shape[-1])
+        force, mode = slice(0, ports), slice(ports, ports + modes)
+        modal, motion = range(ports, ports + modes), slice(ports + modes, None)
+        total = np.zeros((*frequency.shape, gap.shape[-1], gap.shape[-1]), dtype=complex)
+        # Bearings g = (Z - 1) gap; modes (1 - w / omega_k) p = -S^H (g - Y z); support
+        # z = N (Y^T (g + gap) + w^2 M z), where the compliance N may be zero.
+        total[..., force, :] = np.eye(ports, gap.shape[-1]) - extra @ gap
+        total[..., mode, force] = orbits.conj().transpose(0, 2, 1)[:, None]
+        total[..., modal, modal] = 1.0 - frequency[..., None] * inverse[:, None]
+        total[..., mode, motion] = -total[..., mode, force] @ self.rows
+        total[..., motion, :] = -(compliance @ self.rows.T) @ through
+        total[..., motion, motion] += np.eye(own) - w**2 * (compliance @ self.mass)
+        return total
+
+    def pencil(self) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Return A and B of a linear eigenproblem A y = w B y with nearly the same eigenvalues.
+
+        Fast rotor modes answer the bearings statically and a motion of the housings with their
+        gyroscopic couple and their mass. The compliance becomes constant + left
+        (w - poles)^-1 right with its states as unknowns.
+        """
+        slow, static, first, second = self._slow
+        inverse, orbits = self._pick(slow)
+        length, ports, modes = orbits.shape
+        own = len(self.mass)
+        soil_states = self.compliance.states(_ROUGH)
+        sizes = (ports, modes, own, own, len(soil_states.poles), own, ports)
+        ends = np.cumsum(sizes)
+        force, mode, motion, load, soil, rate, gap = (
+            slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
+        modal = range(mode.start, mode.stop)
+        a = np.zeros((length, ends[-1], ends[-1]), dtype=complex)
+        b = np.zeros_like(a)
+        middle = 0.25 * self.highest
+        # Each block of rows in the order of the unknowns.
+        a[:, force, force] = np.eye(ports)
+        a[:, force, gap] = np.eye(ports) - self.stiffness
+        b[:, force, gap] = 1j * self.damping
+        a[:, mode, force], a[:, modal, modal] = orbits.conj().transpose(0, 2, 1), 1.0
+        a[:, mode, motion] = -a[:, mode, force] @ self.rows
+        b[:, modal, modal] = inverse
+        a[:, motion, motion], a[:, motion, load] = np.eye(own), -soil_states.constant
+        a[:, motion, soil] = -soil_states.left
+        a[:, load, force] = a[:, load, gap] = -self.rows.T
+        a[:, load, load] = np.eye(own)
+        b[:, load, motion] = self.rows.T @ first @ self.rows
+        b[:, load, rate] = middle * (self.mass + self.rows.T @ second @ self.rows)
+        a[:, soil, load], a[:, soil, soil] = soil_states.right, np.diag(soil_states.poles)
+        b[:, soil, soil] = np.eye(len(soil_states.poles))
+        a[:, rate, rate], b[:, rate, motion] = np.eye(own), np.eye(own) / middle
+        a[:, gap, force], a[:, gap, mode], a[:, gap, gap] = static, -orbits, np.eye(ports)
+        a[:, gap, motion] = (np.eye(ports) - static) @ self.rows
+        return a, b
+
+    @cached_property
+    def _slow(self) -> tuple[IntArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Modes that are slow in either sense, (n, 2 k), and what others do, (n, 2 b, 2 b)."""
+        inverse, _ = self._modes
+        count, ports = self.resonant.shape[1], len(self.rows)
+        order = np.argsort(-inverse, axis=1)
+        slow = np.concatenate([self.resonant, order[:, order.shape[1] - count:]], axis=1)
+        others = np.ones_like(inverse)
+        np.put_along_axis(others, slow, 0.0, axis=1)
+        powers = others[:, None] * inverse[:, None] ** np.arange(3)[:, None]
+        moments = (powers @ self._residues).reshape(-1, 3, ports, ports)
+        return slow, moments[:, 0], moments[:, 1], moments[:, 2]
+
+    def guesses(self, count: int) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Solve the linear eigenproblem for as many modes as are wanted.
+
+        Returns
+        -------
+        frequency : (n, p) complex array
+            w of all that vibrates in range, ascending, filled up with NaN [rad/s].
+        vector : (n, p, d) complex array
+            What `matrix` sends nearly to zero.
+
+        """
+        a, b = self.pencil()
+        memory = np.flatnonzero(b.any(axis=(0, 1)))
+        # About a growing vibration: no passive machine has one, so that the inverse exists even
+        # without any mass or static stiffness.
+        centre = -0.1j * self.highest
+        spread = np.linalg.solve(a - centre * b, b[..., memory])
+        values, vectors = np.linalg.eig(spread[:, memory])
+        values = np.where(np.abs(values) * self.highest < 1e-6, 1e-6 / self.highest, values)
+        frequency = centre + 1.0 / values
+        keep = vibrates(frequency) & (np.abs(frequency) < 2.0 * self.highest)
+        count = min(int(keep.sum(axis=1).max()), count)
+        order = np.argsort(np.where(keep, frequency.real, np.inf), axis=1)[:, :count]
+        ports, modes = len(self.rows), self.resonant.shape[1]
+        motion = ports + 2 * modes
+        leading = [*range(ports + modes), *range(motion, motion + len(self.mass))]
+        full = spread[:, leading] @ np.take_along_axis(vectors, order[:, None], axis=2)
+        return (np.take_along_axis(np.where(keep, frequency, np.nan), order, axis=1),
+                full.transpose(0, 2, 1))
+
+    def solve(self, count: int) -> tuple[ComplexArray, ComplexArray, BoolArray, FloatArray]:
+        """
+        Solve for the lowest frequencies.
+
+        Returns
+        -------
+        frequency : (n, p) complex array
+            w [rad/s] of at most `count`, NaN where there are fewer.
+        vector : (n, p, d) complex array
+            What `matrix` sends to zero.
+        sound : (n,) bool array
+            Whether every guess has led to a mode of its own.
+        untold : (n,) float array
+            Lowest frequency of a light vibration that is left out, as its compliance is not
+            determined [rad/s]; infinite where there is none.
+
+        """
+        guess, vector = self.guesses(count)
+        exists = np.isfinite(guess)
+        frequency = np.where(exists, guess, self.highest)
+        wanted: BoolArray = exists & self.compliance.agrees(frequency)
+        light = exists & ~wanted & (np.abs(frequency.imag) < _LIGHT * np.abs(frequency))
+        untold = np.where(light, frequency.real, np.inf).min(axis=1, initial=np.inf)
+        vector[~wanted] = 1.0
+        active: BoolArray = wanted.copy()
+        for _ in range(_ITERATIONS):
+            step, vector = self._newton(frequency, vector)
+            frequency = frequency + np.where(wanted, step, 0.0)
+            active &= np.abs(step) > _CONVERGED * np.abs(frequency)
+            if not active.any():
+                break
+        moved = wanted & (np.abs(frequency - guess) > _NEAR_GUESS * np.abs(frequency))
+        frequency = np.where(wanted & ~active & vibrates(frequency), frequency, np.nan)
+        unsound = active | moved | _repeats(frequency, vector)
+        if self.compliance.known is not None:
+            # What a rough fit says far from the real axis may have no mode near its guess.
+            heavy = unsound & (guess.imag > _LIGHT * np.abs(guess))
+            frequency = np.where(heavy, np.nan, frequency)
+            unsound &= ~heavy
+        return frequency, vector, np.asarray(~unsound.any(axis=1)), untold
+
+    def _newton(
+        self, frequency: ComplexArray, vector: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return the step of every frequency and its next vector."""
+        # A little beside: at an eigenvalue itself the matrix has no inverse.
+        shift = 1e-7 * np.abs(frequency)
+        near = self.matrix(frequency + shift)
+        slope = (self.matrix(frequency + 2.0 * shift) - near) / shift[..., None, None]
+        vector = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+        change = np.linalg.solve(near, slope @ vector[..., None])[..., 0]
+        along = (vector.conj() * change).sum(axis=-1)
+        return shift - 1.0 / along, change / along[..., None]
+
+    def amplitudes(self, frequency: ComplexArray, vector: ComplexArray) -> ComplexArray:
+        """Return the amplitudes of all rotor modes, forward then backward, (n, p, m)."""
+        _, orbits = self._modes
+        ports, modes = len(self.rows), self.resonant.shape[1]
+        load = vector[..., ports + modes:] @ self.rows.T - vector[..., :ports]
+        forced = self._gains(frequency) * (load @ orbits.conj())
+        np.put_along_axis(forced, self.resonant[:, None],
+                          vector[..., ports:ports + modes], axis=2)
+        return forced
+
+
+def vibrates(frequency: ComplexArray) -> BoolArray:
+    """Return which eigenvalues vibrate at all; overdamped ones have no frequency."""
+    return np.asarray(frequency.real > _CREEPING * np.abs(frequency))
+
+
+def _repeats(frequency: ComplexArray, vector: ComplexArray) -> BoolArray:
+    """Return which modes have been found before in their row, (n, p)."""
+    unit = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+    parallel = np.abs(unit.conj() @ unit.transpose(0, 2, 1)) > _SAME
+    gap = np.abs(frequency[:, :, None] - frequency[:, None])
+    same = gap <= 2.0 * _CONVERGED * np.abs(frequency)[:, None]
+    return np.asarray(np.tril(parallel & same, -1).any(axis=2))

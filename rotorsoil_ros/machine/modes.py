@@ -1,0 +1,328 @@
+"""The machine's own vibration over speed, and the speeds that are critical."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+import itertools
+import math
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.spectrum import Spectrum, SpectrumSolver
+from rotorsoil_ros.units import rad_s_to_hz
+
+# Speeds at which the search for criticals begins, and up to how many it looks closer.
+_FIRST_SPEEDS = 41
+_MOST_SPEEDS = 400
+
+# A mode continues a curve if its shape is more alike than its frequency is apart by this much.
+_ALIKE = 0.1
+
+# Modes that cross omega = Omega in the range lie below this many times its end.
+_ABOVE = 1.1
+_ALL = 10**6
+
+# A rotor that moves so much less than its blocks stays still.
+_STILL = 1e-9
+
+# A critical speed is found to this share of itself, or what round-off leaves after so many steps.
+_FOUND = 1e-12
+_STEPS = 40
+
+
+@dataclass(frozen=True)
+class Campbell:
+    """
+    Free vibration over rotor speed, modes sorted by frequency.
+
+    Attributes
+    ----------
+    speed : (n,) float array
+        Rotor speed [rad/s].
+    eigenvalue : (n, m) complex array
+        lambda of exp(lambda t) [rad/s]; NaN where a speed has fewer modes.
+    whirl : (n, m) int array
+        +1 forward, -1 backward, 0 where there is no mode.
+    branch : (n, m) int array
+        Which curve a mode belongs to, followed across speed by its shape; -1 where there is no
+        mode.
+    untold : (n,) float array
+        Lowest frequency of a light vibration that is missing, because what is known of the
+        support does not determine it [rad/s]; infinite where there is none.
+
+    """
+
+    speed: FloatArray
+    eigenvalue: ComplexArray
+    whirl: IntArray
+    branch: IntArray
+    untold: FloatArray
+
+    @property
+    def omega(self) -> FloatArray:
+        """Damped frequency |Im lambda|, (n, m) [rad/s]."""
+        return np.abs(self.eigenvalue.imag)
+
+    @property
+    def damping_ratio(self) -> FloatArray:
+        """-Re lambda / |lambda|, (n, m) [-]; negative is unstable."""
+        return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
+
+
+@contextmanager
+def _solvable() -> Iterator[None]:
+    """Turn what the linear algebra refuses into an error of this package."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise NotSolvedError(f'the modes of this machine cannot be computed: {error}') from error
+
+
+@_solvable()
+def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
+    """
+    Return the lowest modes at each speed.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    speeds : (n,) float array
+        Rotor speeds, rising for the branches to make sense [rad/s].
+    count : int
+        Modes wanted at each speed. Fewer are returned where the machine has no more, or where
+        the table of a soil ends below them.
+
+    Notes
+    -----
+    Every mode obeys the compliance of the soil at its own frequency, continued from real
+    frequencies to its decaying vibration, S(lambda / i). What is overdamped has no frequency
+    and is left out.
+
+    References
+    ----------
+    Design note `soil_and_foundation`, sec. 3; API 684 for the use of the diagram.
+
+    """
+    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
+    if not (len(speeds) and np.all(np.isfinite(speeds)) and np.all(speeds >= 0.0)):
+        raise RotorSoilError(f'speeds must be >= 0 rad/s and finite, got {speeds}')
+    if not count >= 1:
+        raise RotorSoilError(f'count must be at least 1 mode, got {count}')
+    found = SpectrumSolver.lowest(model, speeds, count)
+    return Campbell(speeds, 1j * found.frequency, found.whirl, _follow(found), found.untold)
+
+
+@dataclass(frozen=True)
+class CriticalSpeed:
+    """
+    Speed that excites a mode with its own frequency.
+
+    Attributes
+    ----------
+    speed : float
+        omega = Omega [rad/s].
+    whirl : int
+        +1 forward, which unbalance excites; -1 backward.
+    damping_ratio : float
+        Of the mode [-].
+    deflection : (k, 2) complex array
+        Its shape over (x, z) of the rotor's nodes, the largest amplitude being one; where the
+        rotor stays still, that of the support is.
+    support : (s,) complex array
+        Motion of the support in the same shape, over (x, y, z, rx, ry, rz) of each block, then
+        the deflections of pedestals.
+
+    """
+
+    speed: float
+    whirl: int
+    damping_ratio: float
+    deflection: ComplexArray
+    support: ComplexArray
+
+    @property
+    def amplification_factor(self) -> float:
+        """Return 1 / (2 zeta) [-]; infinite without damping, or with less."""
+        return 0.5 / self.damping_ratio if self.damping_ratio > 0.0 else math.inf
+
+    def separation_margin(self, running: float) -> float:
+        """Return the distance from a running speed [rad/s], as a share of that speed."""
+        return abs(self.speed - running) / running
+
+    def required_margin(self, running: float) -> float:
+        """
+        Return the separation margin that a running speed [rad/s] needs.
+
+        References
+        ----------
+        The rule of API 617 (7th ed.), as API RP 684 (2nd ed.), SP6.8.2.10, explains it: none
+        below an amplification factor AF of 2.5; for a critical speed below the running speed
+        17 (1 - 1 / (AF - 1.5)) or 16 percent, for one above 10 + 17 (1 - 1 / (AF - 1.5)) or 26
+        percent, whichever is less.
+
+        """
+        factor = self.amplification_factor
+        if factor < 2.5:
+            return 0.0
+        margin = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), 0.16)
+        return margin + (0.10 if self.speed > running else 0.0)
+
+
+@_solvable()
+def critical_speeds(
+    model: CoupledModel, speed_range: tuple[float, float],
+) -> tuple[CriticalSpeed, ...]:
+    """
+    Find the speeds at which a mode's damped frequency is the speed itself.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    speed_range : tuple of two floats
+        Lowest and highest speed [rad/s].
+
+    Returns
+    -------
+    tuple of CriticalSpeed
+        Rising; roots of omega(Omega) - Omega on every followed mode, not points of a grid.
+
+    Raises
+    ------
+    NotSolvedError
+        If modes cannot be told apart, or a light one is not determined by what is known of the
+        support: a critical speed would be missing.
+
+    """
+    low, high = speed_range
+    if not 0.0 <= low < high < math.inf:
+        raise RotorSoilError(f'speed range must be 0 <= low < high in rad/s, got {low:g} to '
+                             f'{high:g}')
+    solver = SpectrumSolver.up_to(model, _ABOVE * high)
+    speed = np.linspace(low, high, _FIRST_SPEEDS)
+    while True:
+        solver, found = solver.refined(speed, _ALL)
+        branch = _follow(found)
+        closer = np.setdiff1d(np.concatenate([
+            _touching(speed, found, branch), _torn(speed, found, branch)]), speed)
+        if not len(closer) or len(speed) > _MOST_SPEEDS:
+            break
+        speed = np.union1d(speed, closer)
+    lost = float(found.untold.min())
+    if lost <= high:
+        raise NotSolvedError(
+            f'the compliance of the support changes too abruptly about {rad_s_to_hz(lost):.4g} '
+            'Hz to tell a lightly damped mode there')
+    criticals = _close(solver, *_crossings(speed, found, branch))
+    return tuple(sorted(criticals, key=lambda critical: critical.speed))
+
+
+def _follow(found: Spectrum) -> IntArray:
+    """Give a mode the number of the curve whose shape and frequency come closest."""
+    exists = np.isfinite(found.frequency)
+    shape = _unit(found.shape)
+    branch = np.full(exists.shape, -1)
+    branch[0, exists[0]] = np.arange(exists[0].sum())
+    free = int(exists[0].sum())
+    for index in range(1, len(branch)):
+        old, new = np.flatnonzero(exists[index - 1]), np.flatnonzero(exists[index])
+        likeness = np.abs(shape[index - 1, old].conj() @ shape[index, new].T)
+        before, after = found.frequency[index - 1, old, None], found.frequency[index, new]
+        gap = np.abs(after - before) / np.abs(after + before)
+        ends, starts = linear_sum_assignment(gap - likeness)
+        alike = (likeness - gap)[ends, starts] > _ALIKE
+        branch[index, new[starts[alike]]] = branch[index - 1, old[ends[alike]]]
+        fresh = new[branch[index, new] < 0]
+        branch[index, fresh] = free + np.arange(len(fresh))
+        free += len(fresh)
+    return branch
+
+
+def _touching(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
+    """Return speeds where a curve that seems to miss omega = Omega may still touch it."""
+    closer = []
+    for name in range(branch.max(initial=-1) + 1):
+        row, mode = np.nonzero(branch == name)
+        place, excess = speed[row], found.frequency[row, mode].real - speed[row]
+        for i in range(1, len(row) - 1):
+            near, before, after = excess[i], excess[i - 1], excess[i + 1]
+            if min(before / near, after / near, 2.0) <= 1.0:
+                continue
+            square, slope, _ = np.polyfit(place[i - 1:i + 2] - place[i], excess[i - 1:i + 2], 2)
+            if slope**2 > 4.0 * square * near:
+                closer.append(place[i] - 0.5 * slope / square)
+    return np.array(closer)
+
+
+def _torn(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
+    """Return speeds between which a curve ends and another begins that may be its end."""
+    closer = []
+    low = found.frequency.real < _ABOVE**0.5 * speed[-1]
+    for i, (before, after) in enumerate(itertools.pairwise(branch)):
+        ends = np.setdiff1d(before[low[i]], after)
+        starts = np.setdiff1d(after[low[i + 1]], before)
+        if np.any(ends >= 0) and np.any(starts >= 0):
+            closer.append(0.5 * (speed[i] + speed[i + 1]))
+    return np.array(closer)
+
+
+def _crossings(
+    speed: FloatArray, found: Spectrum, branch: IntArray,
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Return speeds (c, 2), omega - Omega (c, 2) and shapes (c, 2, d) around each crossing."""
+    rows, modes = [], []
+    for name in range(branch.max(initial=-1) + 1):
+        row, mode = np.nonzero(branch == name)
+        above = found.frequency[row, mode].real > speed[row]
+        for i in np.flatnonzero(above[:-1] != above[1:]):
+            rows.append(row[i:i + 2])
+            modes.append(mode[i:i + 2])
+    at, which = (np.array(pairs, dtype=int).reshape(-1, 2) for pairs in (rows, modes))
+    return speed[at], found.frequency[at, which].real - speed[at], found.shape[at, which]
+
+
+def _close(
+    solver: SpectrumSolver, ends: FloatArray, excess: FloatArray, shapes: ComplexArray,
+) -> list[CriticalSpeed]:
+    """Close all brackets at once by the false position, in its Illinois variant."""
+    if not len(ends):
+        return []
+    wanted, rows = _unit(shapes).conj().transpose(0, 2, 1), np.arange(len(ends))
+    last = np.full(len(ends), -1)
+    for _ in range(_STEPS):
+        speed = ((ends[:, 0] * excess[:, 1] - ends[:, 1] * excess[:, 0])
+                 / (excess[:, 1] - excess[:, 0]))
+        found = solver.solve(speed, _ALL)
+        # Of all modes at a speed the one most like those at both ends.
+        mode = np.nansum(np.abs(_unit(found.shape) @ wanted), axis=2).argmax(axis=1)
+        height = found.frequency[rows, mode].real - speed
+        if np.all(np.abs(height) <= _FOUND * speed):
+            break
+        side = np.where((height > 0.0) == (excess[:, 0] > 0.0), 0, 1)
+        excess[rows, 1 - side] *= np.where(side == last, 0.5, 1.0)
+        ends[rows, side], excess[rows, side], last = speed, height, side
+    return [_critical(solver, found, float(speed[row]), row, int(mode[row]))
+            for row in range(len(speed))]
+
+
+def _critical(
+    solver: SpectrumSolver, found: Spectrum, speed: float, row: int, mode: int,
+) -> CriticalSpeed:
+    frequency, support = found.frequency[row, mode], found.support[row, mode]
+    deflection = solver.deflection(found.rotor[row, mode])
+    largest = np.abs(deflection).max()
+    if not largest > _STILL * np.abs(support).max(initial=0.0):
+        largest = np.abs(support).max()
+    return CriticalSpeed(speed, int(found.whirl[row, mode]),
+                         float(frequency.imag / np.abs(frequency)),
+                         deflection / largest, support / largest)
+
+
+def _unit(shape: ComplexArray) -> ComplexArray:
+    length = np.linalg.norm(shape, axis=-1, keepdims=True)
+    return np.asarray(shape / np.where(length > 0.0, length, 1.0))

@@ -1,0 +1,257 @@
+"""What the machine answers at any speed, without solving again."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
+from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.pieces import evaluate, evaluate_one, Pieces, refine
+from rotorsoil_ros.prediction import Prediction
+from rotorsoil_ros.units import rad_s_to_rpm
+
+__all__ = ['TOLERANCE', 'Prediction', 'Predictor', 'ResponseTable']
+
+# Relative to the local amplitude, at the points checked while refining; ten times sharper than
+# what is promised at any speed.
+TOLERANCE = 1e-5
+
+# Pieces before the first refinement.
+_FIRST_PIECES = 32
+
+# Samples evaluated together: many share a piece, and they stay in the processor's cache.
+_BLOCK = 16384
+
+# Unseen speeds at which a finished table is compared with the exact solution.
+_CHECKS = 200
+
+
+@dataclass(frozen=True)
+class ResponseTable:
+    """
+    Response per unit unbalance of each plane, as complex polynomials between speeds.
+
+    Between two neighbouring edges every channel is a polynomial of the speed, complex as the
+    response itself; the edges crowd where the machine resonates.
+
+    Attributes
+    ----------
+    channels, planes : tuple of str
+        Names of motions and of unbalance planes.
+    transmits_force : (c,) bool array
+        Which channels have a force.
+    pieces : Pieces
+        Edges [rad/s] and coefficients over (planes, channels then forces), per kg m and per
+        squared speed.
+    accuracy : float
+        Largest deviation from the exact solution at speeds that the refinement has not seen,
+        relative to the local amplitude.
+    key : str
+        What identifies the computation in the cache; empty if it was not cached.
+
+    """
+
+    channels: tuple[str, ...]
+    planes: tuple[str, ...]
+    transmits_force: BoolArray
+    pieces: Pieces
+    accuracy: float
+    key: str = ''
+
+    @classmethod
+    def build(
+        cls, model: CoupledModel, speed_range: tuple[float, float], *,
+        tolerance: float = TOLERANCE,
+    ) -> 'ResponseTable':
+        """
+        Solve the coupled system over a range of speeds until it can be interpolated.
+
+        Parameters
+        ----------
+        model : CoupledModel
+            The machine.
+        speed_range : tuple of two floats
+            Lowest and highest speed [rad/s].
+        tolerance : float
+            Relative to the local amplitude of each channel.
+
+        Raises
+        ------
+        NotSolvedError
+            If nothing can be resolved.
+
+        """
+        low, high = speed_range
+        if not 0.0 <= low < high < np.inf:
+            raise RotorSoilError(f'speed range must be 0 <= low < high in rad/s, got '
+                                 f'{low:g} to {high:g}')
+        planes = len(model.planes)
+        forces = model.plane_forces
+        # Unbalance turns forward only. Forces along x and along z alone also see the backward
+        # resonances, of which unbalance may show a narrow trace.
+        acts = np.abs(forces.reshape(len(forces) // 2, 2, planes)) > 0.0
+        single = [(acts * axis[:, None]).reshape(forces.shape) for axis in np.eye(2)]
+        loads = np.concatenate([forces, *single], axis=1)
+
+        def solve(speed: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+            displacement, force = model.synchronous_response(speed, loads)
+            rows = np.concatenate([displacement, force[:, model.transmits_force]], axis=1)
+            columns = rows.transpose(0, 2, 1)
+            return columns[:, :planes], columns[:, planes:]
+
+        edges = np.linspace(low, high, _FIRST_PIECES + 1)
+        pieces = refine(solve, edges, groups=model.groups, tolerance=tolerance)
+        if not np.any(pieces.resolved):
+            raise NotSolvedError('no part of the speed range could be interpolated')
+        table = cls(model.channels, model.planes, model.transmits_force, pieces, np.nan)
+        return replace(table, accuracy=table.measure(model))
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Lowest and highest speed [rad/s]."""
+        return float(self.pieces.edges[0]), float(self.pieces.edges[-1])
+
+    @property
+    def gaps(self) -> FloatArray:
+        """Intervals too close to an undamped resonance to be resolved, (g, 2) [rad/s]."""
+        edges = np.stack([self.pieces.edges[:-1], self.pieces.edges[1:]], axis=1)
+        return edges[~self.pieces.resolved]
+
+    def predictor(self, unbalance: ComplexArray) -> 'Predictor':
+        """
+        Weight the planes with their unbalance.
+
+        Parameters
+        ----------
+        unbalance : (p,) complex array
+            moment * exp(i phase) of every plane [kg m].
+
+        """
+        unbalance = np.asarray(unbalance, dtype=complex)
+        if unbalance.shape != (len(self.planes),) or not np.all(np.isfinite(unbalance)):
+            raise RotorSoilError(f'unbalance must be {len(self.planes)} finite complex moments '
+                                 f'in kg m, got {unbalance}')
+        weighted = np.einsum('kdpc,p->kdc', self.pieces.coefficients, unbalance)
+        moving = len(self.channels)
+        # NaN where no force is transmitted: it stays NaN in every sum, at no further cost.
+        vectors = np.full((*weighted.shape[:2], 2 * moving), complex(np.nan, np.nan))
+        vectors[..., :moving] = weighted[..., :moving]
+        vectors[..., moving:][..., self.transmits_force] = weighted[..., moving:]
+        return Predictor(self, np.concatenate([vectors.real, vectors.imag], axis=-1))
+
+    def measure(self, model: CoupledModel) -> float:
+        """Return the largest deviation from the exact solution at speeds not yet seen."""
+        low, high = self.speed_range
+        random = np.random.default_rng(len(self.pieces.resolved))
+        inner = random.integers(len(self.pieces.resolved), size=_CHECKS)
+        edges, share = self.pieces.edges, random.uniform(size=2 * _CHECKS)
+        speed = np.concatenate([
+            low + (high - low) * share[:_CHECKS],
+            edges[inner] + (edges[inner + 1] - edges[inner]) * share[_CHECKS:]])
+        worst = 0.0
+        for plane in np.eye(len(self.planes), dtype=complex):
+            predictor = self.predictor(plane)
+            seen = speed[predictor.covers(speed)]
+            exact = model.unbalance_response(seen, plane)
+            deviation = predictor.predict(seen).displacement - exact.displacement
+            size = np.abs(exact.displacement)
+            # Channels that do not move at all carry nothing but round-off.
+            floor = 1e-9 * size.max(axis=1, keepdims=True, initial=0.0) + np.finfo(float).tiny
+            worst = max(worst, float((np.abs(deviation) / np.maximum(size, floor)).max(
+                initial=0.0)))
+        return worst
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Return everything but the key as plain arrays."""
+        return {
+            'channels': np.array(self.channels), 'planes': np.array(self.planes),
+            'transmits_force': self.transmits_force, 'edges': self.pieces.edges,
+            'resolved': self.pieces.resolved, 'coefficients': self.pieces.coefficients,
+            'accuracy': np.array(self.accuracy),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray], *, key: str = '') -> 'ResponseTable':
+        """Rebuild a table from `to_arrays`."""
+        return cls(
+            tuple(str(name) for name in arrays['channels']),
+            tuple(str(name) for name in arrays['planes']),
+            arrays['transmits_force'],
+            Pieces(arrays['edges'], arrays['resolved'], arrays['coefficients']),
+            float(arrays['accuracy']), key)
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """
+    Response table under one state of unbalance.
+
+    Attributes
+    ----------
+    table : ResponseTable
+        What is looked up.
+    coefficients : (k, degree + 1, 4 c) float array
+        Real parts of all channels and of all forces, then their imaginary parts.
+
+    """
+
+    table: ResponseTable
+    coefficients: FloatArray
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the motions."""
+        return self.table.channels
+
+    def covers(self, speed: FloatArray) -> BoolArray:
+        """Return whether each speed, (n,) [rad/s], can be answered; NaN cannot."""
+        return self.table.pieces.find(speed) >= 0
+
+    def predict(self, speed: FloatArray) -> Prediction:
+        """
+        Look up the response.
+
+        Parameters
+        ----------
+        speed : (n,) float array
+            Rotor speed [rad/s].
+
+        Returns
+        -------
+        Prediction
+            The same numbers, to the last bit, however the speeds are divided into calls.
+
+        Raises
+        ------
+        OutOfTableError
+            If a speed is not covered.
+
+        """
+        speed = np.asarray(speed, dtype=float)
+        # A single one is what the live node asks, message by message.
+        rows = self._row(float(speed[0])) if len(speed) == 1 else self._rows(speed)
+        return Prediction.of_parts(speed, rows.reshape(len(speed), 2, 2, len(self.channels)))
+
+    def _row(self, speed: float) -> FloatArray:
+        pieces = self.table.pieces
+        index = pieces.find_one(speed)
+        if index < 0:
+            raise self._not_covered(speed)
+        return evaluate_one(pieces, self.coefficients, speed, index)
+
+    def _rows(self, speed: FloatArray) -> FloatArray:
+        pieces, rows = self.table.pieces, np.empty((len(speed), self.coefficients.shape[2]))
+        index = pieces.find(speed)
+        if index.min(initial=0) < 0:
+            raise self._not_covered(float(speed[index < 0][0]))
+        for start in range(0, len(speed), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            evaluate(pieces, self.coefficients, speed[block], index[block], out=rows[block])
+        return rows
+
+    def _not_covered(self, speed: float) -> OutOfTableError:
+        low, high = self.table.speed_range
+        return OutOfTableError(
+            f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and off '
+            f'undamped resonances, got {rad_s_to_rpm(speed):g} rpm')

@@ -1,0 +1,318 @@
+"""How the machine vibrates on its own, at any speed."""
+
+from dataclasses import dataclass, fields, replace
+import math
+
+import numpy as np
+import scipy.linalg
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
+from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.eigen import FreeVibration
+from rotorsoil_ros.machine.support import Support
+from rotorsoil_ros.rotor.reduced import ReducedRotor
+from rotorsoil_ros.rotor.whirl import held, ORBITS
+from rotorsoil_ros.units import rad_s_to_rpm
+
+# A shaft at rest whirls in no direction; one that creeps, relative to its lowest mode, does.
+_CREEP = 1e-9
+
+# Speeds that are solved together: bounds memory.
+_CHUNK = 64
+
+# Modes at rest beyond those wanted that span the rotor's shapes.
+_MORE_SHAPES = 6
+
+# Ratio of a mode's 1 / omega to the largest below which it is round-off.
+_MASSLESS = 1e-6
+
+# Relative error of a frequency that the subspace may cause.
+_DEFECT = 1e-8
+
+# Modes looked at beyond those wanted, at first and at most.
+_SPARE = 6
+_MOST_SPARE = 64
+
+# Rotor modes that are solved for exactly, up to so many times the highest frequency: more of them
+# only where fewer leave the guesses too rough.
+_REACHES = (1.5, 5.0, 1e6)
+
+# Samples from which the compliance is continued.
+_SAMPLES = 120
+
+# The search ends at this many times the rotor's own frequencies.
+_HIGHEST = 30.0
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """
+    Lowest free vibrations at some speeds, NaN where a speed has fewer.
+
+    Attributes
+    ----------
+    frequency : (n, p) complex array
+        w = lambda / i [rad/s]: damped frequency + i decay, ascending in frequency.
+    whirl : (n, p) int array
+        +1 where the rotor's kinetic energy is that of a forward orbit, else -1.
+    shape : (n, p, d) complex array
+        Coordinates in which the kinetic energy is the sum of squares; the same at all speeds.
+    rotor : (n, p, 2, r) complex array
+        Shape of the rotor, forward and backward, in its reduced coordinates.
+    support : (n, p, s) complex array
+        Motion of the support, over the columns of `Support.motion_rows`.
+    untold : (n,) float array
+        Lowest frequency of a light vibration that is left out because what is known of the
+        support does not determine it [rad/s]; infinite where there is none.
+
+    """
+
+    frequency: ComplexArray
+    whirl: IntArray
+    shape: ComplexArray
+    rotor: ComplexArray
+    support: ComplexArray
+    untold: FloatArray
+
+
+@dataclass(frozen=True)
+class SpectrumSolver:
+    """
+    What all speeds share.
+
+    Attributes
+    ----------
+    model : CoupledModel
+        The machine.
+    basis : ReducedRotor
+        Its rotor in a subspace.
+    compliance : Continuation
+        Of the support without its mass.
+    span : tuple of two floats
+        Frequencies between which modes are looked for [rad/s].
+
+    """
+
+    model: CoupledModel
+    basis: ReducedRotor
+    compliance: Continuation
+    span: tuple[float, float]
+
+    @classmethod
+    def up_to(
+        cls, model: CoupledModel, highest: float, *, shapes: int = _MORE_SHAPES,
+    ) -> 'SpectrumSolver':
+        """
+        Prepare for modes up to a frequency, as far as the soil is known.
+
+        Parameters
+        ----------
+        model : CoupledModel
+            The machine.
+        highest : float
+            Frequency [rad/s].
+        shapes : int
+            Least number of modes at rest that span the rotor's shapes.
+
+        """
+        while True:
+            basis = ReducedRotor.of(model.rotor, model.nominal_springs, count=shapes)
+            slow = int((basis.mass * highest**2 > 1.0).sum())
+            if shapes >= slow + _MORE_SHAPES or shapes >= len(basis.shapes):
+                break
+            shapes = slow + _MORE_SHAPES
+        low, high = _known(model.support, highest)
+        omega = np.unique(np.concatenate([
+            np.linspace(low, high, _SAMPLES // 2),
+            np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
+        compliance = Continuation.of(omega, model.support.motion_compliance)
+        return cls(model, basis, compliance, (low, high))
+
+    @classmethod
+    def lowest(
+        cls, model: CoupledModel, speed: FloatArray, count: int,
+    ) -> Spectrum:
+        """
+        Return the lowest modes at each speed.
+
+        Parameters
+        ----------
+        model : CoupledModel
+            The machine.
+        speed : (n,) float array
+            Rotor speeds [rad/s].
+        count : int
+            Modes wanted at each.
+
+        """
+        shapes = count // 2 + _MORE_SHAPES
+        basis = ReducedRotor.of(model.rotor, model.nominal_springs, count=shapes)
+        first = highest = _highest(basis, speed, count)
+        spare = _SPARE
+        while True:
+            _, found = cls.up_to(model, highest, shapes=shapes).refined(speed, count, spare=spare)
+            enough = np.isfinite(found.frequency).sum(axis=1).min() >= count
+            ended = not _answers(model.support, highest) or highest > _HIGHEST * first
+            if enough or (ended and spare > _MOST_SPARE):
+                return found
+            spare, highest = 4 * spare, highest if ended else 2.0 * highest
+
+    def solve(self, speed: FloatArray, count: int, *, spare: int = _SPARE) -> Spectrum:
+        """
+        Return at most `count` modes at each of the speeds (n,) [rad/s].
+
+        So many `spare` ones are looked at besides: their order, and whether they vibrate at all,
+        shows only in the end.
+        """
+        parts = [self._solve(speed[start:start + _CHUNK], count, spare)
+                 for start in range(0, len(speed), _CHUNK)]
+        width = max(part.frequency.shape[1] for part in parts)
+        return Spectrum(*(np.concatenate([_widen(getattr(part, field.name), width)
+                                          for part in parts]) for field in fields(Spectrum)))
+
+    def refined(
+        self, speed: FloatArray, count: int, *, spare: int = _SPARE,
+    ) -> tuple['SpectrumSolver', Spectrum]:
+        """Solve; should its subspace be too small for that, do it again with a larger one."""
+        solver = self
+        while True:
+            found = solver.solve(speed, count, spare=spare)
+            if (solver.defect(speed, found) <= _DEFECT
+                    or len(solver.basis.mass) == len(solver.basis.shapes)):
+                return solver, found
+            basis = ReducedRotor.of(self.model.rotor, self.model.nominal_springs,
+                                    count=2 * len(solver.basis.mass))
+            solver = replace(solver, basis=basis)
+
+    def defect(self, speed: FloatArray, found: Spectrum) -> float:
+        """
+        Return the largest relative error of a frequency that the rotor's subspace causes.
+
+        At the highest speed: forces that the full model lacks there would bend the rotor by so
+        much of its energy.
+        """
+        model, basis = self.model, self.basis
+        row = int(speed.argmax())
+        exists = np.isfinite(found.frequency[row])
+        w = found.frequency[row, exists][:, None, None]
+        turning = w * speed[row] * np.array([1.0, -1.0])[:, None]
+        shape = found.rotor[row, exists]
+        stiffness, mass, polar = held(model.rotor, model.nominal_springs)
+        journals = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
+        # What the bearings must exert for the reduced equations to hold, in both of them.
+        exerted = (shape - w**2 * shape * basis.mass + turning * (shape @ basis.polar)) @ (
+            np.linalg.pinv(basis.shapes[journals]))
+        full = shape @ basis.shapes.T
+        lacking = full @ stiffness - w**2 * (full @ mass) + turning * (full @ polar)
+        lacking[..., journals] -= exerted
+        bent = scipy.linalg.solve(stiffness, lacking.reshape(-1, len(stiffness)).T,
+                                  assume_a='pos').T.reshape(full.shape)
+        error = np.abs((lacking.conj() * bent).sum(axis=(1, 2)))
+        kinetic = np.abs(w[:, 0] * found.shape[row, exists]) ** 2
+        energy = (np.abs(shape) ** 2).sum(axis=(1, 2)) + kinetic.sum(axis=1)
+        return float((error / energy).max(initial=0.0))
+
+    def deflection(self, rotor: ComplexArray) -> ComplexArray:
+        """Return (x, z) of every node, (k, 2), in a shape of the rotor, (2, r)."""
+        return np.asarray(self.basis.shapes[::2] @ rotor.T @ ORBITS)
+
+    def _solve(self, speed: FloatArray, count: int, spare: int) -> Spectrum:
+        basis = self.basis
+        inverse, amplitude = basis.spin(np.maximum(speed, _CREEP * basis.mass.max() ** -0.5))
+        for reach in _REACHES:
+            vibration = self._at(speed, inverse, amplitude, reach)
+            frequency, vector, sound, untold = vibration.solve(count + spare)
+            if sound.all():
+                break
+        else:
+            raise NotSolvedError('modes could not be told apart at '
+                                 f'{rad_s_to_rpm(float(speed[~sound][0])):g} rpm')
+        low, high = self.span
+        known = (frequency.real >= low) & (frequency.real <= high)
+        frequency = np.where(known, frequency, np.nan)
+        most = min(count, int(np.isfinite(frequency).sum(axis=1).max()))
+        order = np.argsort(frequency.real, axis=1)[:, :most]
+        untold = np.where((untold >= low) & (untold <= high), untold, np.inf)
+        return self._spectrum(vibration, amplitude, np.take_along_axis(frequency, order, axis=1),
+                              np.take_along_axis(vector, order[..., None], axis=1), untold)
+
+    def _spectrum(
+        self, vibration: FreeVibration, amplitude: FloatArray, frequency: ComplexArray,
+        vector: ComplexArray, untold: FloatArray,
+    ) -> Spectrum:
+        """Turn what the equations are solved for into shapes that all speeds share."""
+        basis, exists = self.basis, np.isfinite(frequency)
+        states = vibration.amplitudes(np.where(exists, frequency, 0.0), vector)
+        turn, half = amplitude.transpose(0, 2, 1), amplitude.shape[2]
+        rotor = np.stack([states[..., :half] @ turn, states[..., half:] @ turn], axis=2)
+        support = vector[..., vector.shape[2] - len(vibration.mass):]
+        moving = np.sqrt(basis.mass) * rotor
+        forward, backward = (np.abs(moving) ** 2).sum(axis=-1).transpose(2, 0, 1)
+        values, axes = np.linalg.eigh(vibration.mass)
+        below = support @ (axes * np.sqrt(np.maximum(values, 0.0)))
+        # Explicitly: -1 cannot be told where there is no mode at all.
+        moving = moving.reshape(*exists.shape, math.prod(moving.shape[2:]))
+        shape = np.concatenate([moving, below], axis=-1)
+        return Spectrum(
+            frequency, np.where(exists, np.where(forward >= backward, 1, -1), 0),
+            np.where(exists[..., None], shape, np.nan), rotor, support * self.compliance.size,
+            untold)
+
+    def _at(
+        self, speed: FloatArray, inverse: FloatArray, amplitude: FloatArray, reach: float,
+    ) -> FreeVibration:
+        model, support, size = self.model, self.model.support, self.compliance.size
+        rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
+        unit = np.sqrt(model.nominal_springs)
+        journals = (unit[:, None] * self.basis.shapes[rows]) @ amplitude
+        unit = np.repeat(unit, 2)
+        stiffness, damping = model.bearing_coefficients(speed)
+        return FreeVibration(
+            inverse, journals, stiffness / (unit[:, None] * unit),
+            damping / (unit[:, None] * unit), unit[:, None] * support.motion_rows * size,
+            size[:, None] * support.motion_mass * size, self.compliance, self.span[1], reach)
+
+
+def _highest(basis: ReducedRotor, speed: FloatArray, count: int) -> float:
+    """Return a frequency above the first modes of the rotor on its nominal springs."""
+    inverse, _ = basis.spin(np.array([speed.min(), speed.max()]))
+    both = np.sort(np.concatenate([inverse, -inverse], axis=1), axis=1)[:, ::-1]
+    # What has no mass has no mode, but some round-off instead.
+    massive = int((both > _MASSLESS * both[:, :1]).sum(axis=1).min())
+    return float((1.1 / both[:, min(count, massive) - 1]).max())
+
+
+def _answers(support: Support, omega: float) -> bool:
+    """Return whether every soil knows its compliance at a frequency [rad/s]."""
+    try:
+        return bool(np.all(np.isfinite(support.motion_compliance(np.array([omega])))))
+    except OutOfTableError:
+        return False
+
+
+def _known(support: Support, highest: float) -> tuple[float, float]:
+    """Return the part of 0 to `highest` for which every soil gives an answer."""
+    def edge(inside: float, outside: float) -> float:
+        if _answers(support, outside):
+            return outside
+        while abs(outside - inside) > 1e-4 * highest:
+            middle = 0.5 * (inside + outside)
+            known = _answers(support, middle)
+            inside, outside = (middle, outside) if known else (inside, middle)
+        return inside
+
+    within = highest
+    while not _answers(support, within) and within > 1e-6 * highest:
+        within *= 0.5
+    return edge(within, 0.0), edge(within, highest)
+
+
+def _widen(values: np.ndarray, width: int) -> np.ndarray:
+    """Fill up the second axis, if there is one: with NaN, or with the 0 of no whirl."""
+    if values.ndim == 1:
+        return values
+    missing = [(0, 0)] * values.ndim
+    missing[1] = (0, width - values.shape[1])
+    return np.pad(values, missing, constant_values=np.nan if values.dtype == complex else 0)

@@ -1,0 +1,238 @@
+"""How the bearing housings move under the forces that the bearings put into them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+import math
+
+import numpy as np
+import scipy.linalg
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.machine.foundation import BlockReceptance, carrying, Foundation
+from rotorsoil_ros.rotor.bearing import Bearing
+
+
+@dataclass(frozen=True)
+class Support:
+    """
+    Blocks on soil, and pedestals on them, below the bearings.
+
+    Attributes
+    ----------
+    bearings : sequence of Bearing
+        What stands on the blocks.
+    shaft_height : float
+        Of the bearings above the contact plane [m].
+    foundations, soil_models : equally long sequences
+        The blocks and the soil under each.
+
+    """
+
+    bearings: Sequence[Bearing]
+    shaft_height: float
+    foundations: Sequence[Foundation]
+    soil_models: Sequence[SoilModel]
+
+    def __post_init__(self) -> None:
+        if len(self.foundations) != len(self.soil_models):
+            raise RotorSoilError(f'{len(self.foundations)} foundations need as many soil models, '
+                                 f'got {len(self.soil_models)}')
+        names = {foundation.name for foundation in self.foundations}
+        for bearing in self.bearings:
+            if bearing.foundation is not None and bearing.foundation not in names:
+                raise RotorSoilError(f'foundation of {bearing.name} must be one of '
+                                     f'{sorted(names)}, got {bearing.foundation}')
+
+    @cached_property
+    def seat_rows(self) -> FloatArray:
+        """
+        Seat motion per unit block motion, (f, 2 b, 6), zero where a bearing stands elsewhere.
+
+        References
+        ----------
+        The matrix T of the congruence X_B = T q, which needs no inverse of the flexibility
+        of the seed paper's eq. (7): with three collinear bearings that one is singular.
+
+        """
+        rows = np.zeros((len(self.foundations), 2 * len(self.bearings), 6))
+        for block, foundation in enumerate(self.foundations):
+            for seat, bearing in enumerate(self.bearings):
+                if bearing.foundation == foundation.name:
+                    rows[block, 2 * seat:2 * seat + 2] = foundation.seat_rows(
+                        position=bearing.position, height=self.shaft_height)
+        return rows
+
+    @cached_property
+    def _seat_pairs(self) -> FloatArray:
+        """Products of the motion of two seats per unit motion of the blocks, (f, 6, 6, 4 b^2)."""
+        pairs = np.einsum('fpi,fqj->fijpq', self.seat_rows, self.seat_rows)
+        return np.asarray(pairs.reshape(*pairs.shape[:3], math.prod(pairs.shape[3:])))
+
+    @cached_property
+    def pedestal_axes(self) -> list[int]:
+        """Those of the housings' (x, z) that have a pedestal of their own below them."""
+        return [2 * index + axis for index, bearing in enumerate(self.bearings)
+                if bearing.pedestal is not None for axis in range(2)]
+
+    @cached_property
+    def housing_mass(self) -> FloatArray:
+        """Mass of the housings over (x, z) of each, (2 b, 2 b) [kg]."""
+        own = [bearing.pedestal.mass for bearing in self.bearings if bearing.pedestal is not None]
+        total = np.zeros((2 * len(self.bearings), 2 * len(self.bearings)))
+        total[np.ix_(self.pedestal_axes, self.pedestal_axes)] = scipy.linalg.block_diag(*own)
+        return total
+
+    def pedestals(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of all pedestals, (n, 2 b, 2 b); zero where one is rigid."""
+        total = np.zeros((len(omega), *self.housing_mass.shape), dtype=complex)
+        for index, bearing in enumerate(self.bearings):
+            if bearing.pedestal is not None:
+                pair = slice(2 * index, 2 * index + 2)
+                total[:, pair, pair] = bearing.pedestal.compliance(omega)
+        return total
+
+    def standing(self, omega: FloatArray) -> 'Standing':
+        """Return how the support answers forces at frequencies (n,) [rad/s]."""
+        blocks = [BlockReceptance.of(model.compliance(omega), foundation.mass_matrix, omega)
+                  for model, foundation in zip(self.soil_models, self.foundations, strict=True)]
+        deflection = self.pedestals(omega)
+        for pairs, block in zip(self._seat_pairs, blocks, strict=True):
+            deflection += block.between(pairs).reshape(-1, *deflection.shape[1:])
+        return Standing(self, omega, blocks, deflection)
+
+    @cached_property
+    def motion_rows(self) -> FloatArray:
+        """
+        Housing motion per motion of the support, (2 b, s).
+
+        The motion of the support is that of its blocks, then the deflection of its pedestals.
+        """
+        seats = self.seat_rows.transpose(1, 0, 2).reshape(2 * len(self.bearings), -1)
+        return np.concatenate([seats, np.eye(len(seats))[:, self.pedestal_axes]], axis=1)
+
+    @cached_property
+    def motion_mass(self) -> FloatArray:
+        """Mass matrix of the motion of the support, (s, s)."""
+        rows = self.motion_rows
+        total = np.asarray(rows.T @ self.housing_mass @ rows)
+        for index, foundation in enumerate(self.foundations):
+            block = slice(6 * index, 6 * index + 6)
+            total[block, block] += foundation.mass_matrix
+        return total
+
+    def motion_compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of soils and pedestals without any mass, (n, s, s)."""
+        size, blocks = len(self.motion_mass), 6 * len(self.foundations)
+        total = np.zeros((len(omega), size, size), dtype=complex)
+        for index, model in enumerate(self.soil_models):
+            block = slice(6 * index, 6 * index + 6)
+            total[:, block, block] = model.compliance(omega)
+        axes = np.array(self.pedestal_axes, dtype=int)
+        total[:, blocks:, blocks:] = self.pedestals(omega)[:, axes[:, None], axes]
+        return total
+
+
+@dataclass(frozen=True)
+class Standing:
+    """
+    Support at some frequencies.
+
+    Attributes
+    ----------
+    support : Support
+        What it is.
+    omega : (n,) float array
+        Excitation frequency [rad/s].
+    block_receptances : list of BlockReceptance
+        Of each block on its soil.
+    deflection : (n, 2 b, 2 b) complex array
+        Motion of the housings per force into their pedestals [m/N].
+
+    """
+
+    support: Support
+    omega: FloatArray
+    block_receptances: list[BlockReceptance]
+    deflection: ComplexArray
+
+    @cached_property
+    def receptance(self) -> ComplexArray:
+        """
+        Motion of the housings over (x, z) of each per force on them, (n, 2 b, 2 b) [m/N].
+
+        A pedestal is a compliance in series with that of its seat, and carries the housing.
+        """
+        return self._carried(self.deflection)
+
+    def _carried(self, motion: ComplexArray) -> ComplexArray:
+        """Return what the mass of the housings makes of their motion, (n, 2 b, k)."""
+        mass = self.support.housing_mass
+        if not mass.any():  # the usual case, at no cost
+            return motion
+        return np.linalg.solve(carrying(self.deflection, mass, self.omega), motion)
+
+    def pushed(self, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Return what moves while the bearings exert nothing.
+
+        Parameters
+        ----------
+        loads : (2 b + 6 f, k) complex array
+            Forces on the housings, then on each block [N, N m].
+
+        Returns
+        -------
+        housings (n, 2 b, k), blocks (n, 6 f, k) : complex arrays
+            Motion of the housings; that of the blocks without the housings' forces [m, rad].
+
+        """
+        count = self.receptance.shape[1]
+        if not loads.any():  # the usual case, at no cost
+            return (np.zeros((1, count, loads.shape[1]), dtype=complex),
+                    np.zeros((1, len(loads) - count, loads.shape[1]), dtype=complex))
+        on_housings, on_blocks = loads[:count], loads[count:].reshape(-1, 1, 6, loads.shape[1])
+        blocks = [block.motion(load) for block, load
+                  in zip(self.block_receptances, on_blocks, strict=True)]
+        seats = np.zeros((len(self.omega), count, loads.shape[1]), dtype=complex)
+        for rows, motion in zip(self.support.seat_rows, blocks, strict=True):
+            seats += rows @ motion
+        return (self._carried(seats + self.deflection @ on_housings),
+                np.concatenate([seats[:, :0], *blocks], axis=1))
+
+    def blocks(
+        self, through: ComplexArray, housings: ComplexArray, loads: ComplexArray,
+        pushed: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Return motion and soil force of the blocks, each (n, 6 f, k) [m, rad], [N, N m].
+
+        What enters the soil is the force at the seats, the load and the block's inertia; the
+        compliance, which may be zero, is not inverted for it.
+
+        Parameters
+        ----------
+        through, housings : (n, 2 b, k) complex arrays
+            Force through the bearings [N] and motion of the housings [m].
+        loads, pushed : (2 b + 6 f, k), (n, 6 f, k) complex arrays
+            As in `pushed`, and its second result.
+
+        """
+        square = self.omega[:, None, None] ** 2
+        count = through.shape[1]
+        seats = through + loads[:count]
+        if self.support.housing_mass.any():
+            seats = seats + square * (self.support.housing_mass @ housings)
+        motions, forces = [through[:, :0]], [through[:, :0]]
+        for index, (rows, block, foundation) in enumerate(zip(
+                self.support.seat_rows, self.block_receptances, self.support.foundations,
+                strict=True)):
+            own = slice(6 * index, 6 * index + 6)
+            at_seats = rows.T @ seats
+            motion = pushed[:, own] + block.motion(at_seats)
+            motions.append(motion)
+            forces.append(at_seats + loads[count:][own]
+                          + square * (foundation.mass_matrix @ motion))
+        return np.concatenate(motions, axis=1), np.concatenate(forces, axis=1)

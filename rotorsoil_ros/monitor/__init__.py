@@ -1,0 +1,1 @@
+"""A stream of speeds and measurements becomes answers, comparisons and verdicts."""

@@ -1,0 +1,291 @@
+"""By what is a running machine judged? The band of its soil, its resonances, its supports."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import json
+import math
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.case import config, models
+from rotorsoil_ros.case.cache import Cache, content_key
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.machine.band import (
+    depends_on_soil,
+    Envelope,
+    highest_poisson_ratio,
+    on_soils,
+    ResponseBand,
+    SoilSpread,
+)
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.response import Predictor, ResponseTable
+from rotorsoil_ros.monitor.points import Reference
+from rotorsoil_ros.monitor.quasistatic import Resonance
+
+# Natural frequencies are looked for between these multiples of the highest speed: what decides
+# on the class of a support lies up to a quarter above it.
+_LOOKED_FOR = (0.02, 1.3)
+
+# A mode belongs to a direction if this share of the rotor's motion is in it.
+_IN_DIRECTION = 0.1
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """
+    A case, solved.
+
+    Attributes
+    ----------
+    case : Case
+        The machine.
+    model : CoupledModel
+        What it stands for.
+    table : ResponseTable
+        Its response.
+    modes : tuple of CriticalSpeed
+        Where omega = Omega, a little beyond the speed range.
+    band : ResponseBand or None
+        Its response on other soils; None on a support that knows of no soil.
+    spread : SoilSpread
+        How far those are from the one of the case.
+    note : str
+        What could not be found, and why; empty if everything was.
+
+    """
+
+    case: Case
+    model: CoupledModel
+    table: ResponseTable
+    modes: tuple[CriticalSpeed, ...]
+    band: ResponseBand | None
+    spread: SoilSpread
+    note: str = ''
+
+    @classmethod
+    def of(
+        cls, case: Case, directory: Path, spread: SoilSpread | None = None,
+    ) -> 'Expectation':
+        """Solve a case, with tables out of a cache, on its soil and all of its spread."""
+        spread = spread or case.uncertainty
+        model = models.coupled_model(case, directory)
+        table = models.response_table(case, model, directory)
+        low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
+        band = None
+        if case.soil is not None and depends_on_soil(model):
+            soils = spread.soils(
+                case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
+            band = ResponseBand.build(table, on_soils(model, soils[1:]))
+        note = ''
+        try:
+            modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
+        except NotSolvedError as error:
+            modes, note = (), f'critical speeds of the model are not known: {error}'
+        return cls(case, model, table, modes, band, spread, note)
+
+    @property
+    def criticals(self) -> tuple[CriticalSpeed, ...]:
+        """Critical speeds in the speed range."""
+        low, high = self.case.speed_range
+        return tuple(mode for mode in self.modes if low <= mode.speed <= high)
+
+    @property
+    def resonances(self) -> list[Resonance]:
+        """Critical speeds and damping ratios, those that are unstable without damping."""
+        return [Resonance(mode.speed, max(mode.damping_ratio, 0.0)) for mode in self.modes]
+
+    def lowest_natural_speed(self, axis: str) -> float:
+        """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
+        column = 'xz'.index(axis)
+        for mode in self.modes:
+            power = np.sum(np.abs(mode.deflection) ** 2, axis=0)
+            if power[column] >= _IN_DIRECTION * power.sum():
+                return mode.speed
+        return math.inf
+
+    def vector(self, unbalances: Mapping[str, complex]) -> ComplexArray:
+        """Return the unbalance of every plane [kg m]; a plane that is not named has none."""
+        return np.array([unbalances.get(plane, 0.0) for plane in self.table.planes],
+                        dtype=complex)
+
+    def reference(
+        self, stamp_ns: IntArray, speed: FloatArray,
+        unbalances: Sequence[tuple[int, ComplexArray]],
+        logged: ComplexArray | None = None,
+    ) -> Reference:
+        """
+        Return predictions and bands over a run.
+
+        Parameters
+        ----------
+        stamp_ns, speed : (m,) arrays
+            Reported speeds [ns], [rad/s].
+        unbalances : sequence of (int, (p,) complex array)
+            From which stamp on which unbalance [kg m]; the first also before it.
+        logged : (m, c) complex array or None
+            Displacements that a node answered; None to answer them now.
+
+        """
+        shape = len(speed), len(self.table.channels)
+        displacement = np.full(shape, complex(np.nan, np.nan))
+        bounds = np.full((4, *shape), np.nan)
+        starts = np.searchsorted(stamp_ns, [start for start, _ in unbalances])
+        starts[0] = 0
+        for begin, end, (_, unbalance) in zip(
+                starts, [*starts[1:], len(speed)], unbalances, strict=True):
+            part = slice(int(begin), int(end))
+            if logged is None:
+                displacement[part] = answer(self.table.predictor(unbalance), speed[part])
+            if self.band is not None and begin < end:
+                envelope = self.envelope(unbalance).at(speed[part])
+                bounds[:, part] = (envelope.low, envelope.high, envelope.behind, envelope.ahead)
+        return Reference(stamp_ns, speed, self.table.channels,
+                         displacement if logged is None else logged, bounds[0], bounds[1],
+                         bounds[2], bounds[3], self.table.speed_range)
+
+    def envelope(self, unbalance: ComplexArray) -> Envelope:
+        """Return the band under one unbalance [kg m]; only where there is a band."""
+        assert self.band is not None
+        return self.band.envelope(unbalance)
+
+
+def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
+    """Return displacements, (m, c), NaN where the table has none."""
+    found = np.full((len(speed), len(predictor.channels)), complex(np.nan, np.nan))
+    covered = predictor.covers(speed)
+    if covered.any():
+        found[covered] = predictor.predict(speed[covered]).displacement
+    return found
+
+
+_KIND = 'criteria'
+_AXES = 'xz'
+_NICE = 19
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """
+    What a measurement is held against, besides the prediction itself.
+
+    Attributes
+    ----------
+    envelope : Envelope or None
+        Band of the response under one unbalance; None on a support that knows of no soil.
+    resonances : tuple of Resonance
+        Critical speeds, a little beyond the speed range.
+    natural_speeds : tuple of two floats
+        Lowest frequency of machine and support along x and along z [rad/s], inf where none.
+
+    """
+
+    envelope: Envelope | None
+    resonances: tuple[Resonance, ...]
+    natural_speeds: tuple[float, float]
+
+    def lowest_natural_speed(self, axis: str) -> float:
+        """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
+        return self.natural_speeds[_AXES.index(axis)]
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Return everything as plain arrays."""
+        arrays = {
+            'resonances': np.array([(resonance.speed, resonance.damping_ratio)
+                                    for resonance in self.resonances]).reshape(-1, 2),
+            'natural_speeds': np.array(self.natural_speeds)}
+        if self.envelope is not None:
+            band = self.envelope
+            arrays |= {'speed': band.speed, 'low': band.low, 'high': band.high,
+                       'behind': band.behind, 'ahead': band.ahead}
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> 'Criteria':
+        """Rebuild criteria from `to_arrays`."""
+        envelope = None
+        if 'speed' in arrays:
+            envelope = Envelope(*(arrays[name] for name in (
+                'speed', 'low', 'high', 'behind', 'ahead')))
+        x, z = arrays['natural_speeds'].tolist()
+        return cls(envelope, tuple(Resonance(*row) for row in arrays['resonances'].tolist()),
+                   (x, z))
+
+
+def criteria_key(case: Case, model: CoupledModel, unbalance: ComplexArray) -> str:
+    """Return what identifies the criteria of a case under an unbalance, (p,) [kg m]."""
+    return content_key(_KIND, models.response_key(case, model), case.uncertainty, unbalance)
+
+
+def stored_criteria(
+    case: Case, model: CoupledModel, unbalance: ComplexArray, directory: Path,
+) -> Criteria | None:
+    """Return criteria if the cache holds them."""
+    arrays = Cache(directory).load(_KIND, criteria_key(case, model, unbalance))
+    return None if arrays is None else Criteria.from_arrays(arrays)
+
+
+def criteria(
+    case: Case, model: CoupledModel, unbalance: ComplexArray, directory: Path,
+) -> Criteria:
+    """
+    Return criteria, computed and stored if the cache does not hold them.
+
+    Parameters
+    ----------
+    case, model : Case, CoupledModel
+        The machine, and what it stands for.
+    unbalance : (p,) complex array
+        Of every plane [kg m]: a band is no sum of the bands of its planes.
+    directory : Path
+        Of the cache.
+
+    Raises
+    ------
+    RotorSoilError
+        If the case cannot be solved on one of its soils.
+
+    """
+    stored = stored_criteria(case, model, unbalance, directory)
+    if stored is not None:
+        return stored
+    solved = Expectation.of(case, directory)
+    found = Criteria(
+        None if solved.band is None else solved.envelope(unbalance), tuple(solved.resonances),
+        (solved.lowest_natural_speed('x'), solved.lowest_natural_speed('z')))
+    Cache(directory).store(
+        _KIND, criteria_key(case, model, unbalance), found.to_arrays())
+    return found
+
+
+def start_aside(
+    file: Path, unbalance: ComplexArray, directory: Path,
+) -> 'subprocess.Popen[str]':
+    """Start a process of low priority that leaves the criteria of a case in the cache."""
+    parts = json.dumps(unbalance.view(float).tolist())
+    return subprocess.Popen(
+        [sys.executable, '-m', __name__, str(file), str(directory), parts],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, 'OMP_NUM_THREADS': '1'})
+
+
+def _main(arguments: Sequence[str]) -> None:
+    file, directory, parts = arguments
+    os.nice(_NICE)
+    try:
+        case = config.load(Path(file))
+        criteria(case, models.coupled_model(case, Path(directory)),
+                 np.array(json.loads(parts), dtype=float).view(complex), Path(directory))
+    except RotorSoilError as error:
+        raise SystemExit(str(error)) from error
+
+
+if __name__ == '__main__':
+    _main(sys.argv[1:])

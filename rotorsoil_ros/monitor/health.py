@@ -1,0 +1,106 @@
+"""How is a machine's data: fresh, answered, or missing, and since when."""
+
+from collections import Counter
+import math
+
+from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.events import Diagnostics, Level, NANOSECONDS
+from rotorsoil_ros.units import rad_s_to_rpm
+
+GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unresolved')
+FAULTS = (*GAPS, 'malformed', 'velocity_missing')
+STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
+COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *STAMPS, 'measured', 'samples')
+
+
+class Health:
+    """Counts of one machine, and the level that they mean at each tick of the caller's clock."""
+
+    def __init__(self, machine: str, speed_range: tuple[float, float]) -> None:
+        self.machine = machine
+        self.speed_range = speed_range
+        self.counts = Counter(dict.fromkeys(COUNTED, 0))
+        self.level = Level.STALE
+        self.last_speed = math.nan
+        self.publishers = 1
+        self._last_ns: int | None = None
+        self._faults = 0
+        self._at_tick = self.counts.copy()
+        self._tick_ns: int | None = None
+        self._heard_ns: int | None = None
+        self._silent_s = 0.0
+        self._rate_hz = 0.0
+
+    def note(self, reason: str, count: int = 1) -> None:
+        """Count something that happened."""
+        self.counts[reason] += count
+        if reason in FAULTS:
+            self._faults += count
+
+    def receive(self, stamp_ns: IntArray, speed: FloatArray) -> None:
+        """Count speeds [rad/s] and look whether their stamps [ns] go forward."""
+        self.last_speed = float(speed[-1])
+        self.counts['received'] += len(speed)
+        for stamp in stamp_ns.tolist():
+            if self._last_ns is not None and stamp <= self._last_ns:
+                self.counts[STAMPS[stamp < self._last_ns]] += 1
+            self._last_ns = stamp
+
+    @property
+    def has_news(self) -> bool:
+        """Whether the last speed must not wait for the next tick: a fault, or a return."""
+        return self.level is not Level.WARN if self._faults else self.level is Level.STALE
+
+    def begin(self, now_ns: int) -> None:
+        """Begin to count time; nobody has been silent before."""
+        self._tick_ns = self._heard_ns = now_ns
+
+    def announce(self, now_ns: int) -> Diagnostics:
+        """Tell a change between two ticks; rate and silence are still those of the last one."""
+        self.level = Level.WARN if self._faults else Level.OK
+        return self._report(now_ns)
+
+    def tick(self, now_ns: int, *, stale_after_s: float) -> Diagnostics:
+        """Close the period that began at the last tick, judge it and report it."""
+        received = self._since_tick('received')
+        if self._tick_ns is not None and now_ns > self._tick_ns:
+            self._rate_hz = received * NANOSECONDS / (now_ns - self._tick_ns)
+        if received or self._heard_ns is None or now_ns < self._heard_ns:
+            self._heard_ns = now_ns
+        self._silent_s = (now_ns - self._heard_ns) / NANOSECONDS
+        if not self.counts['received'] or self._silent_s > stale_after_s:
+            self.level = Level.STALE
+        else:
+            is_well = not self._faults and self.publishers < 2
+            self.level = Level.OK if is_well else Level.WARN
+        report = self._report(now_ns)
+        self._tick_ns, self._at_tick, self._faults = now_ns, self.counts.copy(), 0
+        return report
+
+    def _since_tick(self, reason: str) -> int:
+        return self.counts[reason] - self._at_tick[reason]
+
+    def _report(self, now_ns: int) -> Diagnostics:
+        lowest, highest = self.speed_range
+        values = {
+            'speed_rad_s': self.last_speed, 'speed_rpm': rad_s_to_rpm(self.last_speed),
+            'table_from_rad_s': lowest, 'table_to_rad_s': highest,
+            'rate_hz': self._rate_hz, 'silent_s': self._silent_s,
+            'publishers': self.publishers,
+            **{reason: self.counts[reason] for reason in COUNTED}}
+        return Diagnostics(self.machine, now_ns, self.level, self._summary(), values)
+
+    def _summary(self) -> str:
+        """Say in one sentence what the level rests on."""
+        if self.level is Level.STALE:
+            if not self.counts['received']:
+                return 'waiting for the first speed'
+            return f'no speed for {self._silent_s:.1f} s'
+        if self.level is Level.OK:
+            rate = f', {self._rate_hz:.1f} per second' if self._rate_hz else ''
+            return f'every speed is answered{rate}'
+        if self.publishers > 1 and not any(self._since_tick(reason) for reason in FAULTS):
+            return f'{self.publishers} publishers tell the speed'
+        faults = {reason: self._since_tick(reason) for reason in FAULTS}
+        told = [f'{count} {reason.replace("_", " ")}' for reason, count in faults.items() if count]
+        return 'without an answer: ' + ', '.join(told)

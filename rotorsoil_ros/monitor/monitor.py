@@ -1,0 +1,136 @@
+"""What should the machine do at the speed it has just reported? Look it up, never invent it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.errors import OutOfTableError
+from rotorsoil_ros.events import Diagnostics, Event, Measured, Model, Predicted, Samples, Sink
+from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.monitor.health import Health
+from rotorsoil_ros.monitor.judge import Judge, Judging
+from rotorsoil_ros.prediction import Prediction
+
+NO_ANSWER = complex(np.nan, np.nan)
+
+
+class Monitor:
+    """
+    Answer every reported speed of one machine from its response table.
+
+    A batch of one (live) and of thousands (offline) take the same path and give bitwise the
+    same numbers. No clock is read: every time comes in with the caller.
+    """
+
+    def __init__(
+        self, machine: str, table: ResponseTable, unbalance: ComplexArray, *,
+        sinks: Sequence[Sink], judging: Judging | None = None,
+    ) -> None:
+        self.machine = machine
+        self.table = table
+        self.health = Health(machine, table.speed_range)
+        self._sinks = tuple(sinks)
+        self._predictor = table.predictor(unbalance)
+        self.judge = Judge(machine, self._predictor, judging or Judging())
+
+    def set_unbalance(self, unbalance: ComplexArray) -> None:
+        """Use another unbalance, (planes,) [kg m], from the next speed on."""
+        self._predictor = self.table.predictor(unbalance)
+        self.judge.take_predictor(self._predictor)
+
+    def on_speed(
+        self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray | None = None,
+    ) -> None:
+        """Answer speeds [rad/s] at stamps [ns]; angles of the rotor [rad]; all (n,)."""
+        if not len(speed):
+            return
+        self.health.receive(stamp_ns, speed)
+        try:
+            prediction = self._predictor.predict(speed)
+            self.health.note('answered', len(speed))
+        except OutOfTableError:
+            prediction = self._predict_with_gaps(speed)
+        self._emit(Predicted(self.machine, stamp_ns, prediction))
+        if self.judge.on_speed(
+                stamp_ns, speed, np.full(len(speed), np.nan) if angle is None else angle):
+            self._emit_all(self.judge.follow(stamp_ns, speed))
+        if self.health.has_news:
+            self._emit(self.health.announce(int(stamp_ns[-1])))
+
+    def take_table(
+        self, table: ResponseTable, unbalance: ComplexArray, *, sinks: Sequence[Sink],
+        judging: Judging | None = None,
+    ) -> None:
+        """Answer from another table and judge by other rules, from the next speed on."""
+        self._predictor = table.predictor(unbalance)
+        self.judge = Judge(self.machine, self._predictor, judging or Judging())
+        self.table, self._sinks = table, tuple(sinks)
+        self.health.speed_range = table.speed_range
+
+    def on_measured(self, measured: Measured) -> None:
+        """Hand on what a measuring system says about this machine."""
+        self.health.note('measured', len(measured.stamp_ns))
+        self._emit(measured)
+        self._emit_all(self.judge.on_measured(measured))
+
+    def on_samples(self, samples: Samples) -> None:
+        """Hand on raw samples; the vectors that are in them are found at the next tick."""
+        self.health.note('samples', len(samples.stamp_ns))
+        self._emit(samples)
+        self.judge.on_samples(samples)
+
+    def begin(self, now_ns: int, description: Mapping[str, object]) -> None:
+        """Begin to watch, and say what the predictions rest on."""
+        self.health.begin(now_ns)
+        self.describe(now_ns, description)
+
+    def describe(self, now_ns: int, description: Mapping[str, object]) -> None:
+        """Say what the predictions rest on from now on."""
+        self._emit(Model(self.machine, now_ns, description))
+
+    def tick(self, now_ns: int, *, stale_after_s: float) -> None:
+        """Report the health of the machine over the time since the last tick."""
+        found = list(self.judge.tick(now_ns, stale_after_s=stale_after_s))
+        parts = tuple(event for event in found if isinstance(event, Diagnostics))
+        self._emit_all(event for event in found if not isinstance(event, Diagnostics))
+        health = self.health.tick(now_ns, stale_after_s=stale_after_s)
+        self._emit(replace(health, parts=parts) if parts else health)
+
+    def finish(self, now_ns: int) -> None:
+        """Say what can only be said at the end of a run."""
+        self._emit_all(self.judge.finish(now_ns))
+
+    def _emit(self, event: Event) -> None:
+        for sink in self._sinks:
+            sink(event)
+
+    def _emit_all(self, events: Iterable[Event]) -> None:
+        for event in events:
+            self._emit(event)
+
+    def _predict_with_gaps(self, speed: FloatArray) -> Prediction:
+        """Answer what is covered; count the reason and leave NaN where nothing is."""
+        covered = self._predictor.covers(speed)
+        for reason, holds in self._reasons(speed[~covered]).items():
+            self.health.note(reason, int(np.count_nonzero(holds)))
+        shape = (len(speed), len(self.table.channels))
+        displacement, force = np.full(shape, NO_ANSWER), np.full(shape, NO_ANSWER)
+        if covered.any():
+            answer = self._predictor.predict(speed[covered])
+            self.health.note('answered', len(answer.speed))
+            displacement[covered], force[covered] = answer.displacement, answer.force
+        return Prediction(speed, displacement, force)
+
+    def _reasons(self, speed: FloatArray) -> dict[str, BoolArray]:
+        """Tell for each reason which of the speeds have no answer because of it."""
+        lowest, highest = self.table.speed_range
+        reasons = {'nan': np.isnan(speed), 'infinite': np.isinf(speed)}
+        finite = np.isfinite(speed)
+        reasons['negative'] = finite & (speed < 0.0)
+        reasons['below_table'] = finite & (speed >= 0.0) & (speed < lowest)
+        reasons['above_table'] = finite & (speed > highest)
+        known = np.logical_or.reduce(list(reasons.values()))
+        reasons['unresolved'] = ~known
+        return reasons

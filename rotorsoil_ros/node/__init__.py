@@ -1,0 +1,1 @@
+"""The ROS graph: the only wing that knows rclpy."""

@@ -1,0 +1,218 @@
+"""One machine on the graph: its subscriptions, its monitor and its publishers."""
+
+from collections.abc import Collection
+from functools import partial
+from typing import Any
+
+from rcl_interfaces.msg import Log
+from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64, String
+
+from rotorsoil_ros.case import config
+from rotorsoil_ros.case.loading import Machine, reload
+from rotorsoil_ros.events import Event, Level, Remark, Sink
+from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.node.criteria_feed import Bench
+from rotorsoil_ros.node.parameters import Settings
+from rotorsoil_ros.node.reload import Reloader
+from rotorsoil_ros.node.run_log import RunLog
+from rotorsoil_ros.wire.cdr import IMU
+from rotorsoil_ros.wire.handlers import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.messages import (
+    Encoder,
+    FLOAT64,
+    JOINT_STATE,
+    LOG,
+    Messenger,
+    OWN_TOPICS,
+    Records,
+    STRING,
+    Topics,
+)
+
+TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
+RAW_DEPTH = 1000  # samples kept while the node is busy
+STAMPED = (0,)  # reading the clock takes 3 us, and the message has its own stamp
+OUTPUT = QoSProfile(depth=10)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Watch:
+    """
+    Watches one machine while the node is active.
+
+    Messages stay bytes from the middleware to the monitor and back: what is published is what
+    is logged, and what a foreign publisher sends cannot break the node.
+    """
+
+    def __init__(
+        self, node: LifecycleNode, name: str, machine: Machine, *, settings: Settings,
+        log: RunLog, diagnostics: LifecyclePublisher, bench: Bench,
+    ) -> None:
+        self.name = name
+        self.is_active = False
+        self._node = node
+        self._machine = machine
+        self._settings = settings
+        self._subscriptions: list[Any] = []
+        self._log, self._bench = log, bench
+        self._topics = self._publish(diagnostics)
+        self._shown_channels = machine.table.channels
+        self._rivals: tuple[str, ...] = ()
+        self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks(),
+                               judging=settings.judging(name, machine.case))
+        self._speed_topics: list[str] = []
+        self._raw_topics: dict[str, str] = {}
+        self._subscribe()
+        self._reloader = Reloader(
+            node, name, check=self._check, load=self._load, take=self.take_machine)
+
+    def begin(self, now_ns: int) -> None:
+        """Answer from now on."""
+        self.is_active = True
+        self.monitor.begin(now_ns, self._description())
+        self._ask()
+
+    def tick(self, now_ns: int, *, stale_after_s: float, topics: Collection[str]) -> None:
+        """Report the health of the machine; hear sensors among the topics of the graph."""
+        if self.is_active:
+            self._hear_sensors(topics)
+            self._look_for_rivals()
+            self.monitor.tick(now_ns, stale_after_s=stale_after_s)
+
+    def take_unbalance(self, now_ns: int) -> None:
+        """Use the unbalance that the parameters now have, from the next speed on."""
+        self.monitor.set_unbalance(self._unbalance())
+        if self.is_active:
+            self.monitor.describe(now_ns, self._description())
+            self._ask()
+
+    def take_machine(self, machine: Machine) -> str:
+        """Answer from another case, from the next speed on; return what to say of it."""
+        self._machine = machine
+        self._settings.renew_unbalance(self.name, machine.table.planes, machine.case.unbalance)
+        self.monitor.take_table(
+            machine.table, self._unbalance(), sinks=self._sinks(),
+            judging=self._settings.judging(self.name, machine.case))
+        if self.is_active:
+            self.monitor.describe(
+                self._node.get_clock().now().nanoseconds, self._description())
+            self._ask()
+        shown = '' if self._is_shown else '; its channels are others: no longer shown by rerun'
+        return f'{self.name}: reloaded {machine.case.path}{shown}'
+
+    def destroy(self) -> None:
+        """Leave the graph."""
+        self.is_active = False
+        self._reloader.destroy()
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        for publisher in self._own_publishers:
+            self._node.destroy_lifecycle_publisher(publisher)
+
+    @property
+    def _is_shown(self) -> bool:
+        """Whether the viewer, which was opened with the first case, knows the channels."""
+        return self._machine.table.channels == self._shown_channels
+
+    def _sinks(self) -> list[Sink]:
+        encoder = Encoder(self._machine.table.channels, self._topics)
+        outlets = [self._send, self._log.write] if self._log.is_written else [self._send]
+        sinks: list[Sink] = [Messenger(encoder, outlets), self._tell]
+        return [*sinks, self._log.show] if self._is_shown and self._log.is_shown else sinks
+
+    def _tell(self, event: Event) -> None:
+        """Say in the node's own log what somebody should act on."""
+        if isinstance(event, Remark) and event.level is not Level.OK:
+            self._node.get_logger().warning(f'{self.name}: {event.text}')
+
+    def _ask(self) -> None:
+        """Have the band of what is predicted computed, and what else it is judged by."""
+        self._bench.ask(self.name, self._machine, self._unbalance(),
+                        self.monitor.judge.take_criteria)
+
+    def _check(self) -> None:
+        config.load(self._settings.case_file(self.name))
+
+    def _load(self) -> Machine:
+        return reload(self._settings.case_file(self.name), cache_directory=self._settings.cache)
+
+    def _look_for_rivals(self) -> None:
+        """Count who tells the speed; name them when they are several."""
+        count = self._node.count_publishers
+        self.monitor.health.publishers = sum(count(topic) for topic in self._speed_topics)
+        names: tuple[str, ...] = ()
+        if self.monitor.health.publishers > 1:
+            names = tuple(sorted(
+                f'{info.node_namespace.rstrip("/")}/{info.node_name} on {topic}'
+                for topic in self._speed_topics
+                for info in self._node.get_publishers_info_by_topic(topic)))
+            if names != self._rivals:
+                self._node.get_logger().warning(
+                    f'{self.name}: more than one publisher tells its speed: {", ".join(names)}')
+        self._rivals = names
+
+    def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
+        """Create the publishers; return the names that their topics have after remapping."""
+        self._own_publishers = [
+            self._node.create_lifecycle_publisher(
+                TYPES[kind], f'~/{self.name}/{name}', LATCHED if kind == STRING else OUTPUT)
+            for name, kind in OWN_TOPICS.items()]
+        # Past the lifecycle's own gate, which takes a microsecond: nothing is sent unless active.
+        self._publish_on = {publisher.topic_name: partial(Publisher.publish, publisher)
+                            for publisher in (*self._own_publishers, diagnostics)}
+        return Topics.named(
+            {name: publisher.topic_name for name, publisher in zip(
+                OWN_TOPICS, self._own_publishers, strict=True)},
+            diagnostics=diagnostics.topic_name)
+
+    def _subscribe(self) -> None:
+        for name, kind in TOPICS.items():
+            topic = self._hear(name, kind, depth=self._settings.value('speed_depth'))
+            if name in SPEED_TOPICS:
+                self._speed_topics.append(topic)
+        for channel in self._machine.table.channels:
+            name = f'measured/{channel}/imu'
+            if raw_channel(name):
+                self._raw_topics[self._node.resolve_topic_name(f'{self.name}/{name}')] = name
+
+    def _hear_sensors(self, topics: Collection[str]) -> None:
+        """Subscribe to raw samples that somebody publishes; of most channels nobody does."""
+        for topic in self._raw_topics.keys() & topics:
+            self._hear(self._raw_topics.pop(topic), IMU, depth=RAW_DEPTH)
+
+    def _hear(self, name: str, kind: str, *, depth: int) -> str:
+        """Subscribe to an input; return its topic."""
+        reliability = ReliabilityPolicy[self._settings.value('speed_reliability').upper()]
+        topic = str(self._node.resolve_topic_name(f'{self.name}/{name}'))
+        taken_in = inlet(
+            name, topic, self.monitor, log=self._log.write,
+            rotor_joint=self._settings.value(f'{self.name}.rotor_joint'))
+        receive = self._receive_bare if kind == FLOAT64 else self._receive_stamped
+        self._subscriptions.append(self._node.create_subscription(
+            TYPES[kind], topic, partial(receive, taken_in),
+            QoSProfile(depth=depth, reliability=reliability), raw=True))
+        return topic
+
+    def _receive_stamped(self, taken_in: Inlet, cdr: bytes) -> None:
+        if self.is_active:
+            taken_in(STAMPED, (cdr,))
+
+    def _receive_bare(self, taken_in: Inlet, cdr: bytes) -> None:
+        if self.is_active:
+            taken_in((self._node.get_clock().now().nanoseconds,), (cdr,))
+
+    def _send(self, records: Records) -> None:
+        if self.is_active:
+            publish = self._publish_on[records.topic]
+            for payload in records.payloads:
+                publish(payload)
+
+    def _unbalance(self) -> Any:
+        return self._settings.unbalance(self.name, self._machine.table.planes)
+
+    def _description(self) -> Any:
+        return self._machine.description(self.name, self._unbalance())

@@ -1,0 +1,277 @@
+"""The node: its life cycle around one watch per machine, and the process that runs it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, ExitStack
+import gc
+import signal
+import sys
+import traceback
+from types import FrameType, TracebackType
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.lifecycle import (
+    LifecycleNode,
+    LifecyclePublisher,
+    LifecycleState,
+    TransitionCallbackReturn,
+)
+from rclpy.logging import get_logger
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from rotorsoil_ros.case import cache
+from rotorsoil_ros.case.loading import load_all, Machine
+from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.node.criteria_feed import Bench
+from rotorsoil_ros.node.endpoint import OUTPUT, Watch
+from rotorsoil_ros.node.parameters import Settings
+from rotorsoil_ros.node.run_log import LogSettings, RunLog
+from rotorsoil_ros.wire.messages import (
+    diagnostic_array,
+    DIAGNOSTICS,
+    DIAGNOSTICS_TOPIC,
+    NODE_NAME,
+    Records,
+)
+
+PERIOD_S = 1.0
+SPIN_S = 0.1  # EventsExecutor dispatches nothing without a timeout; signals wait for it
+SWITCH_S = 5e-4  # that an answer may wait for the thread that writes the log
+BAD_INPUT = 2
+EXECUTORS = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
+
+
+class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
+    """
+    Publishes what each machine should do at the speed that it reports.
+
+    Configured it holds tables and logs, active it answers, inactive it is silent.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(NODE_NAME, **options)
+        self.settings = Settings(self)
+        self._watches: list[Watch] = []
+        self._log: RunLog | None = None
+        self._diagnostics: LifecyclePublisher | None = None
+        self._bench: Bench | None = None
+        self._turn, self._topics = 0, set[str]()
+        self._held = ExitStack()
+        self.add_post_set_parameters_callback(self._take_parameters)
+
+    @property
+    def lifecycle_state(self) -> str:
+        """Label of the state: unconfigured, inactive, active or finalized."""
+        return str(self._state_machine.current_state[1])
+
+    def start(self) -> bool:
+        """Configure and activate; return whether the node is active."""
+        return bool(self.trigger_configure() == TransitionCallbackReturn.SUCCESS
+                    and self.trigger_activate() == TransitionCallbackReturn.SUCCESS)
+
+    def release(self) -> None:
+        """Finish the logs and let go of tables, topics and timers; a second time does nothing."""
+        self._held.close()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Load the tables, open the logs, enter the graph."""
+        with ExitStack() as stack:
+            stack.push(self._tell_unexpected)
+            try:
+                self._configure()
+            except (RotorSoilError, OSError) as error:
+                self.get_logger().error(str(error))
+                self.release()
+                return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Publish."""
+        result = super().on_activate(state)
+        for watch in self._watches:
+            watch.begin(self._now_ns())
+        self.get_logger().info('active')
+        return result
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Fall silent; logs stay open."""
+        for watch in self._watches:
+            watch.is_active = False
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go back to before the configuration."""
+        self.release()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Leave."""
+        self.release()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go back to before the configuration after something unexpected."""
+        self.release()
+        return super().on_error(state)
+
+    def _configure(self) -> None:
+        settings, held = self.settings, self._held
+        settings.check()
+        machines = self._load()
+        held.callback(self._forget)
+        for name, machine in machines.items():
+            held.callback(settings.forget_unbalance, name)
+            settings.declare_unbalance(name, machine.table.planes, machine.case.unbalance)
+        logger = self.get_logger()
+        log = RunLog(
+            self._log_settings(), machines, tell=logger.info, complain=logger.error)
+        held.callback(log.close)
+        bench = Bench(cache.directory(settings.cache), complain=logger.error)
+        held.callback(bench.close)
+        diagnostics = self.create_lifecycle_publisher(DiagnosticArray, DIAGNOSTICS_TOPIC, OUTPUT)
+        held.callback(self.destroy_lifecycle_publisher, diagnostics)
+        for name, machine in machines.items():
+            watch = Watch(self, name, machine, settings=settings, log=log,
+                          diagnostics=diagnostics, bench=bench)
+            held.callback(watch.destroy)
+            self._watches.append(watch)
+        timer = self.create_timer(
+            PERIOD_S / len(machines), self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        held.callback(self.destroy_timer, timer)
+        self._log, self._diagnostics, self._bench = log, diagnostics, bench
+        settings.is_locked = True
+        where = f', log {log.path}' if log.path else ''
+        self.get_logger().info(f'watching {", ".join(machines)}{where}')
+
+    def _load(self) -> dict[str, Machine]:
+        """Load every machine, each case file once."""
+        files = {name: self.settings.case_file(name) for name in self.settings.machines}
+        by_file = load_all(files.values(), cache_directory=self.settings.cache,
+                           tell=self.get_logger().info)
+        return {name: by_file[file] for name, file in files.items()}
+
+    def _forget(self) -> None:
+        self.settings.is_locked = False
+        self._turn = 0
+        self._watches, self._log, self._diagnostics, self._bench = [], None, None, None
+
+    def _log_settings(self) -> LogSettings:
+        value = self.settings.value
+        return LogSettings(
+            directory=value('log.directory'), name=value('log.name'), mcap=value('log.mcap'),
+            rerun=value('log.rerun'), rerun_url=value('log.rerun_url'),
+            split_mib=value('log.split_mib'), split_s=value('log.split_s'),
+            budget_mib=value('log.budget_mib'))
+
+    def _tick(self) -> None:
+        """Once a second of wall time for each machine, and for what they share."""
+        turn, self._turn = self._turn, (self._turn + 1) % len(self._watches)
+        if turn == 0:
+            self._topics = {name for name, _ in self.get_topic_names_and_types()}
+            if self._bench is not None:
+                self._bench.step()
+            if self._log is not None:
+                self._log.flush()
+                self._report_log(self._log)
+        # In turns: fifty at once would keep the speeds of all waiting.
+        self._watches[turn].tick(
+            self._now_ns(), stale_after_s=float(self.settings.value('stale_after_s')),
+            topics=self._topics)
+
+    def _report_log(self, log: RunLog) -> None:
+        """Say on /diagnostics, and so in the log itself, how logging goes."""
+        report = log.report(self._now_ns())
+        if report is not None and self._diagnostics is not None and self._diagnostics.is_activated:
+            payload = serialize_message(diagnostic_array(report))
+            self._diagnostics.publish(payload)
+            log.write(Records(
+                self._diagnostics.topic_name, DIAGNOSTICS, [report.stamp_ns], [payload]))
+
+    def _take_parameters(self, parameters: list[Parameter]) -> None:
+        for watch in () if self.settings.is_changing else self._watches:
+            own = f'{watch.name}.unbalance.'
+            if any(parameter.name.startswith(own) for parameter in parameters):
+                watch.take_unbalance(self._now_ns())
+
+    def _now_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+    def _tell_unexpected(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Tell what rclpy would swallow in a transition."""
+        if isinstance(error, Exception):
+            self.get_logger().error(''.join(traceback.format_exception(kind, error, trace)))
+
+
+class Stop:
+    """
+    A signal that asks the process to stop.
+
+    It is noted whenever it comes and interrupts only what may be interrupted, so that it can
+    tear nothing: neither an executor that is being built nor a log that is being finished.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._interrupts = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._take)
+
+    @contextmanager
+    def interrupting(self) -> Iterator[None]:
+        """Raise KeyboardInterrupt in this block if the signal comes, or has come before it."""
+        self._interrupts = True
+        try:
+            if self.requested:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._interrupts = False
+
+    def _take(self, number: int, frame: FrameType | None) -> None:
+        del number, frame
+        self.requested = True
+        if self._interrupts:
+            raise KeyboardInterrupt
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; return 0, or 2 where it could not start."""
+    stop = Stop()
+    with ExitStack() as stack:
+        try:
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            stack.callback(rclpy.try_shutdown)
+            node = RotorsoilNode()
+            stack.callback(node.destroy_node)
+            executor = EXECUTORS[node.settings.value('executor')]()
+            stack.callback(executor.shutdown)
+            executor.add_node(node)
+            stack.callback(node.release)
+            with stop.interrupting():
+                if node.settings.value('autostart') and not node.start():
+                    return BAD_INPUT
+            sys.setswitchinterval(SWITCH_S)
+            gc.freeze()  # tables and classes stay: looking for garbage among them costs latency
+            while not stop.requested and node.context.ok():
+                # Returns after SPIN_S; `spin_once` would return to Python after every message.
+                executor.spin_until_future_complete(Future(), timeout_sec=SPIN_S)
+        except InputError as error:
+            get_logger(NODE_NAME).error(str(error))
+            return BAD_INPUT
+        except (KeyboardInterrupt, ExternalShutdownException):
+            pass
+    return 0
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

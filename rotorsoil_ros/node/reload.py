@@ -1,0 +1,77 @@
+"""How does a changed case file come into a running node? Aside, and then all at once."""
+
+from collections.abc import Callable
+from threading import Thread
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode
+from std_srvs.srv import Trigger
+
+from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.errors import RotorSoilError
+
+GLANCE_S = 0.05
+
+
+class Reloader:
+    """
+    The service `~/<machine>/reload`.
+
+    A case file that is wrong is refused at once. The table of one that is right is computed by
+    another process, for which a thread waits; the executor only swaps what is ready, so that a
+    speed is answered from the old case or from the new one. EventsExecutor knows no coroutines
+    in services: the answer comes before the swap, which the log and the latched model tell.
+    """
+
+    def __init__(
+        self, node: LifecycleNode, name: str, *, check: Callable[[], object],
+        load: Callable[[], Machine], take: Callable[[Machine], str],
+    ) -> None:
+        self._node, self._name = node, name
+        self._check, self._load, self._take = check, load, take
+        self._thread: Thread | None = None
+        self._loaded: Machine | RotorSoilError | OSError | None = None
+        self._timer = node.create_timer(
+            GLANCE_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer.cancel()
+        self._service = node.create_service(Trigger, f'~/{name}/reload', self._serve)
+
+    def destroy(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_service(self._service)
+        self._node.destroy_timer(self._timer)
+
+    def _serve(self, request: Any, response: Any) -> Any:
+        del request
+        if self._thread is not None:
+            response.message = f'{self._name}: a reload is under way'
+            return response
+        try:
+            self._check()
+        except (RotorSoilError, OSError) as error:
+            response.message = f'{error}; the old case stays'
+            return response
+        self._thread = Thread(target=self._work, name=f'reload {self._name}', daemon=True)
+        self._thread.start()
+        self._timer.reset()
+        response.success = True
+        response.message = f'~/{self._name}/model will tell when the new case answers'
+        return response
+
+    def _work(self) -> None:
+        try:
+            self._loaded = self._load()
+        except (RotorSoilError, OSError) as error:
+            self._loaded = error
+
+    def _look(self) -> None:
+        """Swap what the thread has loaded."""
+        if self._thread is None or self._thread.is_alive():
+            return
+        loaded, self._loaded, self._thread = self._loaded, None, None
+        self._timer.cancel()
+        if isinstance(loaded, Machine):
+            self._node.get_logger().info(self._take(loaded))
+        else:
+            self._node.get_logger().error(f'{loaded}; the old case stays')

@@ -1,0 +1,1 @@
+"""Shafts, discs and bearings, at every speed."""

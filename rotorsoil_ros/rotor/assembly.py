@@ -1,0 +1,236 @@
+"""What turns: shaft and discs, as the matrices of Lalanne and Ferraris."""
+
+from dataclasses import dataclass
+from functools import cached_property
+import math
+
+import numpy as np
+
+from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.errors import require, RotorSoilError
+from rotorsoil_ros.rotor.beam import BeamElements, plane_matrices
+from rotorsoil_ros.rotor.bearing import Bearing
+
+__all__ = ['Bearing', 'Disc', 'Material', 'Probe', 'Rotor', 'ShaftSection']
+
+# Stations closer than this share of the shaft length to a node are that node.
+_SAME_NODE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Linear elastic material: E [Pa], nu [-], rho [kg/m^3]."""
+
+    young_modulus: float
+    poisson_ratio: float
+    density: float
+
+    def __post_init__(self) -> None:
+        require(0.0 < self.young_modulus < math.inf, 'young_modulus', '> 0 Pa and finite',
+                self.young_modulus)
+        require(-1.0 < self.poisson_ratio <= 0.5, 'poisson_ratio', 'in (-1, 0.5]',
+                self.poisson_ratio)
+        require(0.0 <= self.density < math.inf, 'density', '>= 0 kg/m^3 and finite', self.density)
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftSection:
+    """
+    Piece of shaft whose diameters vary linearly, divided evenly into elements.
+
+    Attributes
+    ----------
+    length : float
+        [m].
+    outer_diameter, inner_diameter : tuple of two floats
+        At the left and the right end [m].
+    elements : int
+        Number of finite elements, at least 1.
+    material : Material
+        What it is made of.
+    added_mass : float
+        Mass per length that does not stiffen [kg/m].
+
+    """
+
+    length: float
+    outer_diameter: tuple[float, float]
+    inner_diameter: tuple[float, float]
+    elements: int
+    material: Material
+    added_mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(0.0 < self.length < math.inf, 'length', '> 0 m and finite', self.length)
+        require(self.elements >= 1, 'elements', 'at least 1', self.elements)
+        require(0.0 <= self.added_mass < math.inf, 'added_mass', '>= 0 kg/m and finite',
+                self.added_mass)
+        for outer, inner in zip(self.outer_diameter, self.inner_diameter, strict=True):
+            require(0.0 < outer < math.inf, 'outer_diameter', '> 0 m and finite', outer)
+            require(0.0 <= inner < outer, 'inner_diameter',
+                    f'>= 0 m and less than the outer diameter {outer:g} m', inner)
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """Rigid disc: position along the shaft [m], mass [kg], inertias [kg m^2]."""
+
+    name: str
+    position: float
+    mass: float
+    diametral_inertia: float
+    polar_inertia: float
+
+    def __post_init__(self) -> None:
+        require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)
+        require(0.0 <= self.diametral_inertia < math.inf, 'diametral_inertia',
+                '>= 0 kg m^2 and finite', self.diametral_inertia)
+        require(0.0 <= self.polar_inertia < math.inf, 'polar_inertia', '>= 0 kg m^2 and finite',
+                self.polar_inertia)
+
+    @classmethod
+    def cylinder(
+        cls, name: str, position: float, *, outer_diameter: float, inner_diameter: float,
+        width: float, density: float,
+    ) -> 'Disc':
+        """Return a homogeneous cylindrical disc by its dimensions [m] and density [kg/m^3]."""
+        require(0.0 < outer_diameter < math.inf, 'outer_diameter', '> 0 m and finite',
+                outer_diameter)
+        require(0.0 <= inner_diameter < outer_diameter, 'inner_diameter',
+                f'>= 0 m and less than the outer diameter {outer_diameter:g} m', inner_diameter)
+        require(0.0 < width < math.inf, 'width', '> 0 m and finite', width)
+        require(0.0 < density < math.inf, 'density', '> 0 kg/m^3 and finite', density)
+        mass = density * math.pi / 4.0 * (outer_diameter**2 - inner_diameter**2) * width
+        polar = mass * (outer_diameter**2 + inner_diameter**2) / 8.0
+        return cls(name, position, mass, polar / 2.0 + mass * width**2 / 12.0, polar)
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """Station of the shaft whose motion is wanted: position along the shaft [m]."""
+
+    name: str
+    position: float
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """
+    Shaft with its stations, meshed.
+
+    Attributes
+    ----------
+    shaft_height : float
+        Height of the shaft axis above the contact plane [m].
+    shaft : tuple of ShaftSection
+        From left to right, y = 0 at the left end.
+    discs, bearings, probes
+        Stations; each becomes a node of the mesh.
+
+    """
+
+    shaft_height: float
+    shaft: tuple[ShaftSection, ...]
+    discs: tuple[Disc, ...]
+    bearings: tuple[Bearing, ...]
+    probes: tuple[Probe, ...] = ()
+
+    def __post_init__(self) -> None:
+        require(math.isfinite(self.shaft_height), 'shaft_height', 'finite, in m',
+                self.shaft_height)
+        places = {bearing.position for bearing in self.bearings}
+        if not self.shaft or len(places) < 2:
+            raise RotorSoilError('a rotor needs a shaft and bearings at two places or more, '
+                                 f'got {len(self.shaft)} sections, {len(places)} places')
+        length = self.length
+        for station in self.stations:
+            if not -_SAME_NODE * length <= station.position <= length * (1.0 + _SAME_NODE):
+                raise RotorSoilError(f'position of {station.name} must be on the shaft, '
+                                     f'0 to {length:g} m, got {station.position:g}')
+
+    @property
+    def stations(self) -> tuple[Disc | Bearing | Probe, ...]:
+        """Bearings, discs and probes: what is a node of the mesh."""
+        return (*self.bearings, *self.discs, *self.probes)
+
+    @property
+    def length(self) -> float:
+        """Total length of the shaft [m]."""
+        return math.fsum(section.length for section in self.shaft)
+
+    @cached_property
+    def node_positions(self) -> FloatArray:
+        """Positions of the mesh nodes along the shaft [m], ascending."""
+        ends = np.concatenate([[0.0], np.cumsum([section.length for section in self.shaft])])
+        grid = [np.linspace(left, right, section.elements + 1) for left, right, section
+                in zip(ends[:-1], ends[1:], self.shaft, strict=True)]
+        # Divisions first: a station that falls on one takes its exact place, not the reverse.
+        nodes = list(np.concatenate(grid))
+        for station in self.stations:
+            if np.abs(np.asarray(nodes) - station.position).min() > _SAME_NODE * self.length:
+                nodes.append(station.position)
+        positions = np.sort(nodes)
+        apart = np.diff(positions, prepend=-math.inf) > _SAME_NODE * self.length
+        return positions[apart]
+
+    def node_of(self, position: float) -> int:
+        """Return the index of the mesh node at a station's position [m]."""
+        return int(np.argmin(np.abs(self.node_positions - position)))
+
+    @property
+    def elements(self) -> BeamElements:
+        """The shaft's finite elements, one between each two neighbouring nodes."""
+        ends = np.cumsum([section.length for section in self.shaft])
+        left, right = self.node_positions[:-1], self.node_positions[1:]
+        owner = np.searchsorted(ends, 0.5 * (left + right))
+        sections = [self.shaft[i] for i in owner]
+        start = (ends - np.array([section.length for section in self.shaft]))[owner]
+        share = np.stack([left - start, right - start], axis=1)
+        share /= np.array([section.length for section in sections])[:, None]
+
+        def linear(values: list[tuple[float, float]]) -> FloatArray:
+            pairs = np.array(values)
+            return np.asarray(pairs[:, :1] * (1.0 - share) + pairs[:, 1:] * share)
+
+        materials = [section.material for section in sections]
+        return BeamElements(
+            length=right - left,
+            outer_diameter=linear([section.outer_diameter for section in sections]),
+            inner_diameter=linear([section.inner_diameter for section in sections]),
+            young_modulus=np.array([material.young_modulus for material in materials]),
+            poisson_ratio=np.array([material.poisson_ratio for material in materials]),
+            density=np.array([material.density for material in materials]),
+            added_mass=np.array([section.added_mass for section in sections]),
+        )
+
+    @cached_property
+    def plane_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Stiffness, mass and polar inertia of shaft and discs in one plane.
+
+        Returns
+        -------
+        three (2 k, 2 k) float arrays
+            Over (deflection, slope) of the k nodes. In the z plane the slope is rx, in the
+            x plane it is -rz. Bearings are not in it.
+
+        """
+        count = 2 * len(self.node_positions)
+        totals = (np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count)))
+        for total, parts in zip(totals, plane_matrices(self.elements), strict=True):
+            for node, part in enumerate(parts):
+                total[2 * node:2 * node + 4, 2 * node:2 * node + 4] += part
+        _, mass, polar = totals
+        for disc in self.discs:
+            deflection = 2 * self.node_of(disc.position)
+            slope = deflection + 1
+            mass[deflection, deflection] += disc.mass
+            mass[slope, slope] += disc.diametral_inertia
+            polar[slope, slope] += disc.polar_inertia
+        return totals
+
+    @property
+    def mass(self) -> float:
+        """Mass of shaft and discs [kg]."""
+        _, mass, _ = self.plane_matrices
+        return float(mass[::2, ::2].sum())

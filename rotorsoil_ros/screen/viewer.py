@@ -1,0 +1,241 @@
+"""What does an engineer see? Trends and the vibrating machine, as a recording for rerun."""
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import rerun as rr
+
+from rotorsoil_ros.arrays import ComplexArray
+from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.events import (
+    Band,
+    Compared,
+    Diagnostics,
+    Event,
+    Level,
+    Model,
+    NANOSECONDS,
+    Predicted,
+    Remark,
+    Samples,
+    Zoned,
+)
+from rotorsoil_ros.monitor.criteria import Criteria, stored_criteria
+from rotorsoil_ros.screen.blueprint import blueprint, Shown
+from rotorsoil_ros.screen.bode import Bode
+from rotorsoil_ros.screen.channels import trends
+from rotorsoil_ros.screen.orbits import Orbits
+from rotorsoil_ros.screen.picture import FRAME_NS, Picture
+from rotorsoil_ros.screen.recording import Recording
+from rotorsoil_ros.screen.scene import Scene
+from rotorsoil_ros.screen.trends import TrendLines, ZoneLane
+from rotorsoil_ros.screen.waterfall import ORDERS, Waterfall
+
+APPLICATION = 'rotorsoil'
+HELD_NS = 5 * NANOSECONDS  # of a run that nobody looks at: a chunk costs a kilobyte
+LEVELS = {Level.OK: 'INFO', Level.WARN: 'WARN', Level.ERROR: 'ERROR', Level.STALE: 'WARN'}
+
+
+class RerunSink:
+    """Collects events and sends them to a recording in columns, whenever the caller flushes."""
+
+    def __init__(
+        self, path: Path | None, machines: Mapping[str, Machine], *, url: str = '',
+    ) -> None:
+        self._stream = rr.RecordingStream(APPLICATION)
+        shown = {name: Shown(name, machine.case,
+                             trends(name, machine.case, machine.table.channels),
+                             Scene(machine.case, machine.table.channels))
+                 for name, machine in machines.items()}
+        # A footer would keep two kilobytes in memory for every chunk until the end.
+        file = [rr.FileSink(path, write_footer=False)] if path else []
+        viewer = [rr.GrpcSink(url)] if url else []
+        self._stream.set_sinks(*file, *viewer, default_blueprint=blueprint(shown))
+        recording = Recording(self._stream)
+        self._views = {name: MachineView(recording, shown[name], machine)
+                       for name, machine in machines.items()}
+        self._held_ns = 0 if url else HELD_NS
+
+    def __enter__(self) -> 'RerunSink':
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __call__(self, event: Event) -> None:
+        """Collect an event."""
+        self._views[event.machine].take(event)
+
+    def show(self, events: Iterable[Event]) -> None:
+        """Collect events and send them."""
+        for event in events:
+            self(event)
+        self.flush()
+
+    def flush(self) -> None:
+        """Send what was collected; into a file alone, some seconds at a time."""
+        for view in self._views.values():
+            if view.held_ns >= self._held_ns:
+                view.flush()
+
+    def close(self) -> None:
+        """Send the rest and finish the recording."""
+        for view in self._views.values():
+            view.flush()
+        self._stream.disconnect()
+
+
+class MachineView:
+    """What is shown of one machine."""
+
+    def __init__(self, recording: Recording, shown: Shown, machine: Machine) -> None:
+        self._recording = recording
+        self._machine = machine
+        self._shown = shown
+        self._unbalance: ComplexArray | None = machine.case.unbalance
+        self._criteria: Criteria | None = None
+        self._predicted: list[Predicted] = []
+        self._compared: list[Compared] = []
+        self._bands: list[Band] = []
+        self._moments: deque[tuple[Event, int]] = deque()
+        self._level: Level | None = None
+        self._last_ns: int | None = None
+        self._speed = np.nan
+        self._trends = TrendLines(recording, shown.name, shown.trends)
+        self._bode = Bode(recording, shown.entity('bode'), shown.trends,
+                          machine.table.predictor(machine.case.unbalance))
+        self._orbits = Orbits(recording, shown.entity('orbits'), shown.case,
+                              machine.table.channels)
+        self._zones = ZoneLane(recording, shown.entity('zones'))
+        fastest = machine.table.speed_range[1] / (2.0 * np.pi)
+        self._waterfalls = {trend.channel: Waterfall(
+            recording, shown.entity('waterfall', trend.channel),
+            f'{shown.name}/measured/{trend.channel}/imu', top_hz=ORDERS * fastest)
+            for trend in shown.housings}
+        self._picture = Picture(
+            recording, shown.entity('picture'), shown.entity('caption'), shown.scene)
+
+    def take(self, event: Event) -> None:
+        """Collect an event."""
+        match event:
+            case Predicted():
+                self._predicted.append(event)
+                self._last_ns = int(event.stamp_ns[-1])
+                self._speed = float(event.prediction.speed[-1])
+            case Compared():
+                self._compared.append(event)
+            case Samples():
+                if waterfall := self._waterfalls.get(event.channel):
+                    waterfall.take(event, self._speed)
+            case Band():
+                self._bands.append(event)
+            case Zoned() | Remark() | Diagnostics() | Model():
+                # Clocks differ: what is told without data stands at the data that it follows.
+                if self._last_ns is not None or isinstance(event, Model):
+                    self._moments.append((event, self._last_ns or event.stamp_ns))
+
+    @property
+    def held_ns(self) -> int:
+        """How much message time waits to be sent [ns]."""
+        if self._last_ns is None or not self._predicted:
+            return HELD_NS
+        return abs(self._last_ns - int(self._predicted[0].stamp_ns[0]))
+
+    def flush(self) -> None:
+        """Send what was collected."""
+        self._look_for_criteria()
+        self._orbits.expect(self._compared)
+        if self._predicted:
+            self._send_predicted(self._predicted)
+        if self._compared:
+            self._orbits.compare(self._compared)
+            for joined in _joined(self._compared):
+                self._trends.compared(joined)
+                self._bode.compare(joined)
+        if self._bands:
+            self._trends.band(self._bands)
+        self._predicted, self._compared, self._bands = [], [], []
+        while self._moments:
+            self._send_moment(*self._moments.popleft())
+
+    def _send_predicted(self, events: list[Predicted]) -> None:
+        stamps = np.concatenate([event.stamp_ns for event in events])
+        speed = np.concatenate([event.prediction.speed for event in events])
+        displacement = np.concatenate([event.prediction.displacement for event in events])
+        self._trends.predicted(stamps, speed, displacement)
+        self._bode.now(stamps, speed)
+        self._orbits.predicted(stamps, displacement)
+        if self._criteria is not None:
+            self._trends.limits(stamps, speed, self._criteria.natural_speeds,
+                                self._machine.case.zones)
+        rows = self._recording.begins(self._shown.entity('picture'), stamps, FRAME_NS)
+        if len(rows):
+            self._picture.draw(stamps[rows], speed[rows], displacement[rows])
+
+    def _send_moment(self, event: Event, stamp_ns: int) -> None:
+        match event:
+            case Zoned():
+                self._zones.draw(event, stamp_ns)
+            case Remark():
+                self._write(event.level, event.text, stamp_ns)
+            case Diagnostics() if event.level is not self._level:
+                self._level = event.level
+                self._write(event.level, event.summary, stamp_ns)
+            case Model():
+                self._take_model(event)
+
+    def _write(self, level: Level, text: str, stamp_ns: int) -> None:
+        self._recording.send(self._shown.entity('events'), np.array([stamp_ns]),
+                             rr.TextLog.columns(
+                                 text=[f'{_clock(stamp_ns)}  {text}'], level=[LEVELS[level]]))
+
+    def _take_model(self, event: Model) -> None:
+        """Draw what is predicted over speed anew if it rests on something else now."""
+        table, told = self._machine.table, event.description.get('unbalance')
+        tables = event.description.get('tables')
+        if not isinstance(told, dict) or not isinstance(tables, dict):
+            return
+        unbalance: ComplexArray | None = None
+        if tables.get('response') == table.key:  # of another case nothing is known here
+            unbalance = np.array([
+                told[plane]['moment_kg_m'] * np.exp(1j * told[plane]['phase_rad'])
+                for plane in table.planes])
+        if unbalance is None or self._unbalance is None or not np.allclose(
+                unbalance, self._unbalance, rtol=1e-9, atol=0.0):
+            self._unbalance, self._criteria = unbalance, None
+            self._bode.predict(None if unbalance is None else table.predictor(unbalance))
+            self._bode.band(None)
+
+    def _look_for_criteria(self) -> None:
+        """Read band and supports once somebody has computed them; then there are zones."""
+        if self._criteria is None and self._unbalance is not None and any(
+                isinstance(event, Zoned) and event.predicted for event, _ in self._moments):
+            self._criteria = stored_criteria(
+                self._machine.case, self._machine.model, self._unbalance,
+                self._machine.directory)
+            if self._criteria is not None:
+                self._bode.band(self._criteria.envelope)
+
+
+def _clock(stamp_ns: int) -> str:
+    """Return the time of day (UTC): the viewer's own column is too narrow for it."""
+    return str(np.datetime64(stamp_ns, 'ns')).partition('T')[2][:8]
+
+
+def _joined(events: Iterable[Compared]) -> Iterable[Compared]:
+    """Join what was measured of the same channels: one column is cheaper than many rows."""
+    by_channels: dict[tuple[str, ...], list[Compared]] = {}
+    for event in events:
+        by_channels.setdefault(event.channels, []).append(event)
+    for channels, found in by_channels.items():
+        def all_of(name: str, found: list[Compared] = found) -> np.ndarray:
+            return np.concatenate([getattr(event, name) for event in found])
+        yield Compared(found[0].machine, all_of('stamp_ns'), all_of('speed'), channels, *(
+            all_of(name) for name in ('amplitude', 'phase', 'deviation', 'predicted', 'low',
+                                      'high')))

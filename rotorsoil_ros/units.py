@@ -1,0 +1,31 @@
+"""How user units become SI: the only place in which a 60 appears."""
+
+import math
+from typing import TypeVar
+
+from rotorsoil_ros.arrays import FloatArray
+
+RADIANS_PER_TURN = 2.0 * math.pi
+SECONDS_PER_MINUTE = 60.0
+
+Number = TypeVar('Number', float, FloatArray)
+
+
+def rpm_to_rad_s(speed_rpm: Number) -> Number:
+    """Return revolutions per minute as rad/s."""
+    return speed_rpm * RADIANS_PER_TURN / SECONDS_PER_MINUTE
+
+
+def rad_s_to_rpm(speed: Number) -> Number:
+    """Return rad/s as revolutions per minute."""
+    return speed * SECONDS_PER_MINUTE / RADIANS_PER_TURN
+
+
+def hz_to_rad_s(frequency_hz: Number) -> Number:
+    """Return cycles per second as rad/s."""
+    return frequency_hz * RADIANS_PER_TURN
+
+
+def rad_s_to_hz(omega: Number) -> Number:
+    """Return rad/s as cycles per second."""
+    return omega / RADIANS_PER_TURN

@@ -1,0 +1,1 @@
+"""Events as bytes of ROS messages, with or without ROS installed."""

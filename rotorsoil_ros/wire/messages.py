@@ -1,0 +1,262 @@
+"""How an event reads as ROS messages: the one mapping, used by publishers and logs alike."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+import json
+import struct
+from typing import NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import numpy as np
+from rcl_interfaces.msg import Log
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.events import (
+    Band,
+    Compared,
+    Demodulated,
+    Diagnostics,
+    Event,
+    Level,
+    Model,
+    NANOSECONDS,
+    Predicted,
+    Remark,
+)
+from rotorsoil_ros.prediction import Prediction
+from rotorsoil_ros.wire.cdr import ARRAYS, JointLayout, STAMP
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+FLOAT64 = 'std_msgs/msg/Float64'
+STRING = 'std_msgs/msg/String'
+DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+DIAGNOSTICS_TOPIC = '/diagnostics'
+NODE_NAME = 'rotorsoil'
+LOG = 'rcl_interfaces/msg/Log'
+MOST_LAYOUTS = 64  # sets of channels that are measured together; more than that nobody means
+
+# Topics of a machine below the node's name, and their types.
+OWN_TOPICS = {
+    'amplitude': JOINT_STATE, 'phase': JOINT_STATE, 'amplitude_low': JOINT_STATE,
+    'amplitude_high': JOINT_STATE, 'residual': JOINT_STATE,
+    'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
+    'model': STRING}
+
+SEVERITY = {Level.OK: Log.INFO, Level.WARN: Log.WARN, Level.ERROR: Log.ERROR,
+            Level.STALE: Log.WARN}
+
+pack_stamp = struct.Struct('=iI').pack  # in the order of this machine, as rclpy does
+
+
+class Records(NamedTuple):
+    """Messages of one topic as they travel and as they are logged: their times [ns] and CDR."""
+
+    topic: str
+    type: str
+    log_time_ns: Sequence[int]
+    payloads: Sequence[bytes]
+    latched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """Full names of the topics on which one machine is answered."""
+
+    amplitude: str
+    phase: str
+    amplitude_low: str
+    amplitude_high: str
+    residual: str
+    demodulated_amplitude: str
+    demodulated_phase: str
+    events: str
+    model: str
+    diagnostics: str = DIAGNOSTICS_TOPIC
+
+    @classmethod
+    def of(cls, namespace: str, machine: str) -> 'Topics':
+        """Name the topics as a node that nobody renamed does; namespace `` or `/plant`."""
+        own = f'{namespace}/{NODE_NAME}/{machine}'
+        return cls.named({name: f'{own}/{name}' for name in OWN_TOPICS})
+
+    @classmethod
+    def named(cls, topics: Mapping[str, str], *, diagnostics: str = DIAGNOSTICS_TOPIC) -> 'Topics':
+        """Take the full names of OWN_TOPICS, by their names below the machine's."""
+        return cls(diagnostics=diagnostics, **{
+            name.replace('/', '_'): topic for name, topic in topics.items()})
+
+
+def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
+    """Return zero-to-peak values: displacement and force (n, 2, c), and velocity (n, c)."""
+    # Bitwise the same for one speed and for many, which `np.abs` of complex numbers is not: it
+    # may take another path for the tail of an array than for its body.
+    squares = prediction.parts * prediction.parts
+    sizes: FloatArray = np.sqrt(squares[:, 0] + squares[:, 1])
+    return sizes, sizes[:, 0] * prediction.speed[:, None]
+
+
+def phases(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
+    """Return phases in [-pi, pi] [rad]: displacement and force, and velocity, as of i X."""
+    parts = prediction.parts
+    real, imag = parts[:, 0], parts[:, 1]
+    return np.arctan2(imag, real), np.arctan2(real[:, 0], -imag[:, 0])
+
+
+class JointStateWriter:
+    """
+    Fill JointStates of constant names, n at a time.
+
+    The names never change, so rclpy serializes one message, once, and only the numbers between
+    its constant bytes are replaced: the same message at a tenth of the cost.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        blank = [float('nan')] * len(names)
+        template = serialize_message(
+            JointState(name=list(names), position=blank, velocity=blank, effort=blank))
+        layout = JointLayout.of(template)
+        clean = bytearray(layout.size)  # rclpy leaves chance bytes in the padding: not in ours
+        for at, shared in layout.fixed:
+            clean[at] = shared
+        arrays = [layout.span(name) for name in ARRAYS]
+        starts = [at.start for at in (STAMP, *arrays)] + [layout.size]
+        stops = [0] + [at.stop for at in (STAMP, *arrays)]
+        self._between = [bytes(clean[stop:start])
+                         for stop, start in zip(stops, starts, strict=True)]
+        self._width = 8 * len(names)
+
+    def write(self, stamp_ns: Sequence[int], values: FloatArray) -> list[bytes]:
+        """Return n messages; values are (n, 3, names): position, velocity, effort, or NaN."""
+        return self.write_parts(stamp_ns, values[:, ::2], values[:, 1])
+
+    def write_parts(
+        self, stamp_ns: Sequence[int], outer: FloatArray, velocity: FloatArray,
+    ) -> list[bytes]:
+        """Return n messages of position and effort, (n, 2, names), and velocity, (n, names)."""
+        ends, middle, width = outer.tobytes(), velocity.tobytes(), self._width
+        front, names, to_velocity, to_effort, tail = self._between
+        written, start = [], 0
+        for stamp in stamp_ns:
+            effort, stop = 2 * start + width, start + width
+            written.append(b''.join((
+                front, pack_stamp(*divmod(stamp, NANOSECONDS)), names, ends[2 * start:effort],
+                to_velocity, middle[start:stop], to_effort, ends[effort:2 * stop], tail)))
+            start = stop
+        return written
+
+
+class Encoder:
+    """Say the events of one machine in ROS messages."""
+
+    def __init__(self, channels: Sequence[str], topics: Topics) -> None:
+        self._topics = topics
+        self._joint_states = JointStateWriter(channels)
+        self._writers: dict[tuple[str, ...], JointStateWriter] = {}
+
+    def encode(self, event: Event) -> Iterator[Records]:
+        """Yield the messages of an event; measurements came as messages already."""
+        match event:
+            case Predicted():
+                yield from self._predicted(event)
+            case Band():
+                yield from self._band(event)
+            case Compared(stamp_ns=stamps, speed=speed, channels=channels):
+                residual = event.residual
+                yield self._states(self._topics.residual, channels, stamps, residual,
+                                   speed[:, None] * residual)
+            case Demodulated():
+                yield from self._demodulated(event)
+            case Remark(stamp_ns=stamp_ns):
+                payload = serialize_message(log_message(event))
+                yield Records(self._topics.events, LOG, [stamp_ns], [payload])
+            case Diagnostics(stamp_ns=stamp_ns):
+                payload = serialize_message(diagnostic_array(event))
+                yield Records(self._topics.diagnostics, DIAGNOSTICS, [stamp_ns], [payload])
+            case Model(stamp_ns=stamp_ns):
+                payload = serialize_message(String(data=json.dumps(event.description)))
+                yield Records(self._topics.model, STRING, [stamp_ns], [payload], latched=True)
+
+    def _predicted(self, event: Predicted) -> Iterator[Records]:
+        stamps, topics = event.stamp_ns.tolist(), self._topics
+        write = self._joint_states.write_parts
+        # The amplitude is under way before the phase is even computed.
+        yield Records(topics.amplitude, JOINT_STATE, stamps,
+                      write(stamps, *moduli(event.prediction)))
+        yield Records(topics.phase, JOINT_STATE, stamps, write(stamps, *phases(event.prediction)))
+
+
+    def _band(self, event: Band) -> Iterator[Records]:
+        stamps, speed = event.stamp_ns.tolist(), event.speed[:, None]
+        for topic, values in ((self._topics.amplitude_low, event.low),
+                              (self._topics.amplitude_high, event.high)):
+            outer = np.stack([values, np.full(values.shape, np.nan)], axis=1)
+            yield Records(topic, JOINT_STATE, stamps,
+                          self._joint_states.write_parts(stamps, outer, speed * values))
+
+    def _demodulated(self, event: Demodulated) -> Iterator[Records]:
+        names = (event.channel, *(f'{event.channel}_{order}x' for order in event.orders[1:]))
+        turning = event.speed[:, None] * event.orders
+        yield self._states(self._topics.demodulated_amplitude, names, event.stamp_ns,
+                           event.amplitude, turning * event.amplitude)
+        ahead = np.arctan2(np.cos(event.phase), -np.sin(event.phase))  # of i X, in [-pi, pi]
+        yield self._states(self._topics.demodulated_phase, names, event.stamp_ns, event.phase,
+                           ahead)
+
+    def _states(
+        self, topic: str, names: tuple[str, ...], stamp_ns: IntArray, position: FloatArray,
+        velocity: FloatArray,
+    ) -> Records:
+        """Return JointStates of some channels, (n, names); no force is measured."""
+        writer = self._writers.get(names)
+        if writer is None:
+            if len(self._writers) >= MOST_LAYOUTS:
+                self._writers.clear()
+            writer = self._writers[names] = JointStateWriter(names)
+        stamps = stamp_ns.tolist()
+        outer = np.stack([position, np.full(position.shape, np.nan)], axis=1)
+        return Records(topic, JOINT_STATE, stamps, writer.write_parts(stamps, outer, velocity))
+
+
+def log_message(event: Remark) -> Log:
+    """Map a remark to the message of every ROS log."""
+    message = Log(level=SEVERITY[event.level], name=f'{NODE_NAME}.{event.machine}',
+                  msg=event.text)
+    message.stamp.sec, message.stamp.nanosec = divmod(event.stamp_ns, NANOSECONDS)
+    return message
+
+
+def diagnostic_array(event: Diagnostics) -> DiagnosticArray:
+    """Map the health of a machine to the message that every ROS monitor reads."""
+    message = DiagnosticArray()
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(event.stamp_ns, NANOSECONDS)
+    message.status = [_status(each) for each in (event, *event.parts)]
+    return message
+
+
+def _status(event: Diagnostics) -> DiagnosticStatus:
+    name = f'{NODE_NAME}: {event.machine} {event.name}'.rstrip()
+    return DiagnosticStatus(
+        level=bytes([event.level]), name=name, hardware_id=event.machine, message=event.summary,
+        values=[KeyValue(key=key, value=decimal(value)) for key, value in event.values.items()])
+
+
+def decimal(value: float | str) -> str:
+    """Write a number without an exponent: counts as integers, quantities to the millionth."""
+    return f'{value:.6f}' if isinstance(value, float) else str(value)
+
+
+class Messenger:
+    """A sink that says events in messages and hands them to its outlets: publishers, logs."""
+
+    def __init__(self, encoder: Encoder, outlets: Sequence[Callable[[Records], None]]) -> None:
+        self._encoder = encoder
+        self._outlets = tuple(outlets)
+
+    def __call__(self, event: Event) -> None:
+        """Encode once, hand out to all."""
+        for records in self._encoder.encode(event):
+            for outlet in self._outlets:
+                outlet(records)

@@ -1,0 +1,117 @@
+"""Logs of the dead are recovered, those of the living are left alone, the oldest make room."""
+
+import os
+
+import pytest
+from rosbags.highlevel import AnyReader
+import yaml
+
+from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.retention import is_unfinished, make_room, Recovery, unfinished
+from rotorsoil_ros.bags.writer import BagWriter, LogFile, new_directory
+
+from test_bag import joint_records, read_all, START, string_records
+
+KIB = 1024
+
+
+def finished(directory, name, *, age=0, count=500):
+    bag = BagWriter(new_directory(directory, name))
+    bag.write(joint_records(count))
+    bag.close()
+    os.utime(bag.path / 'metadata.yaml', (1e9 - age, 1e9 - age))
+    return bag.path
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """Return a bag of two files whose writer died in the second."""
+    bag = BagWriter(new_directory(tmp_path, 'run'), split_s=0.01)
+    bag.write(joint_records(100))
+    bag.flush()
+    bag.write(joint_records(40, start=START + 10**9))
+    bag.write(string_records())
+    bag._file.flush()
+    content = bag.file.read_bytes()
+    listed = (bag.path / 'metadata.yaml').read_bytes()
+    bag.close()
+    bag.file.write_bytes(content)
+    (bag.path / 'metadata.yaml').write_bytes(listed)
+    return bag.path
+
+
+def recover_all(directory):
+    told, complaints = [], []
+    recovery = Recovery(directory, tell=told.append, complain=complaints.append)
+    while not recovery.is_done:
+        if recovery._process is not None:
+            recovery._process.wait(20.0)
+        recovery.step()
+    return told, complaints
+
+
+def test_a_bag_with_a_broken_file_is_whole_again_and_nothing_was_touched(killed, tmp_path):
+    before = {file.name: file.read_bytes() for file in killed.glob('*.mcap')}
+    told, complaints = recover_all(tmp_path)
+    assert len(told) == 1
+    assert '41 messages until' in told[0]
+    assert not complaints
+    assert [file.name for file in bag_reader.files(killed)] == [
+        'run_0.mcap', 'run_1_recovered.mcap']
+    assert {name: (killed / name).read_bytes() for name in before} == before
+    assert len(read_all(killed)) == 141
+    with AnyReader([killed]) as reader:
+        assert reader.message_count == 141
+    said = yaml.safe_load((killed / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert said['custom_data']['recovered'] == 'run_1_recovered.mcap'
+    assert recover_all(tmp_path) == ([], [])
+
+
+def test_what_cannot_be_recovered_is_complained_of(killed, tmp_path):
+    content = (killed / 'run_1.mcap').read_bytes()
+    (killed / 'run_1.mcap').write_bytes(content)
+    (killed / 'run_1_recovered.mcap.partial').mkdir()
+    told, complaints = recover_all(tmp_path)
+    assert not told
+    assert len(complaints) == 1
+    assert 'Is a directory' in complaints[0]
+
+
+def test_the_file_of_a_living_writer_and_a_foreign_file_are_left_alone(tmp_path):
+    (tmp_path / 'run').mkdir()
+    with LogFile(tmp_path / 'run' / 'run_0.mcap') as log:
+        log.write(joint_records(10))
+        log.flush()
+        assert not is_unfinished(log.path)
+        (tmp_path / 'run' / 'foreign.mcap').write_bytes(b'\x89MCAP0\r\n' + bytes(100))
+        assert list(unfinished(tmp_path)) == []
+
+
+def test_the_oldest_logs_make_room_and_nothing_else_does(tmp_path):
+    old = finished(tmp_path, 'run', age=30)
+    middle = finished(tmp_path, 'run', age=20)
+    new = finished(tmp_path, 'run', age=10)
+    foreign = finished(tmp_path, 'other', age=99)
+    (tmp_path / 'run_9').mkdir()
+    (tmp_path / 'run_9' / 'notes').write_text('not a log')
+    (old / 'notes').write_text('precious')
+    living = BagWriter(new_directory(tmp_path, 'run'))
+    living.write(joint_records(1))
+    living.flush()
+    size = sum(file.stat().st_size for bag in (new, living.path) for file in bag.iterdir())
+    removed = make_room(tmp_path, 'run', budget=size, current=living.path, keep=[living.file])
+    living.close()
+    assert removed == [old, middle]
+    assert [path.name for path in old.iterdir()] == ['notes']
+    assert not middle.exists()
+    assert foreign.exists()
+    assert new.exists()
+    assert (tmp_path / 'run_9' / 'notes').exists()
+
+
+def test_the_bag_of_another_living_node_makes_no_room(tmp_path):
+    with LogFile(finished(tmp_path, 'run') / 'run_1.mcap') as log:
+        log.write(joint_records(1))
+        log.flush()
+        own = new_directory(tmp_path, 'run')
+        assert make_room(tmp_path, 'run', budget=0, current=own, keep=[]) == []

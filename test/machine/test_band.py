@@ -1,0 +1,115 @@
+"""The soil band against solving the machine on every soil."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
+from rotorsoil_ros.machine.response import ResponseTable
+
+from machines import CONTACT, paper_machine, SOIL
+
+UNBALANCE = np.array([1e-5, 2e-6j])
+RANGE = (60.0, 900.0)
+SPREAD = SoilSpread(samples=12)
+
+
+@pytest.fixture(scope='module')
+def models():
+    """Return the paper's machine on twelve soils, the given one first."""
+    return [paper_machine(ConeModel(soil, CONTACT)) for soil in SPREAD.soils(SOIL)]
+
+
+@pytest.fixture(scope='module')
+def envelope(models):
+    """Return its band."""
+    table = ResponseTable.build(models[0], RANGE)
+    return ResponseBand.build(table, models[1:]).envelope(UNBALANCE)
+
+
+def test_band_is_the_range_over_all_soils(models, envelope):
+    speed = np.random.default_rng(0).uniform(*RANGE, size=400)
+    exact = np.array([model.unbalance_response(speed, UNBALANCE).displacement
+                      for model in models])
+    found = envelope.at(speed)
+    moving = [i for i, name in enumerate(models[0].channels) if name != 'block_y']
+    size = np.abs(exact)[..., moving]
+    # Linear between eight speeds per piece: 2 % where twelve sharp peaks stand side by side.
+    np.testing.assert_allclose(found.high[:, moving], size.max(axis=0), rtol=0.02)
+    np.testing.assert_allclose(found.low[:, moving], size.min(axis=0), rtol=0.02,
+                               atol=2e-3 * size.min(axis=0).max())
+    turn = np.angle(exact * exact[0].conj())[..., moving]
+    known = found.ahead[:, moving] < math.pi
+    np.testing.assert_allclose(found.ahead[:, moving][known], turn.max(axis=0)[known], atol=0.05)
+    np.testing.assert_allclose(found.behind[:, moving][known], turn.min(axis=0)[known], atol=0.05)
+
+
+def test_given_soil_lies_in_its_band(models, envelope):
+    speed = envelope.speed[::5]
+    exact = models[0].unbalance_response(speed, UNBALANCE).displacement
+    moving = [i for i, name in enumerate(models[0].channels) if name != 'block_y']
+    slack = 1.0 + np.array([-1e-3, 1e-3])
+    found = envelope.at(speed)
+    assert np.all(np.abs(exact)[:, moving] >= slack[0] * found.low[:, moving])
+    assert np.all(np.abs(exact)[:, moving] <= slack[1] * found.high[:, moving])
+
+
+def test_soil_matters_near_the_resonance_and_not_far_above_it():
+    # Design note, sec. 5.2: below 1.5 f_n the band matters, above 3 f_n mass decides.
+    soft = [paper_machine(ConeModel(soil, CONTACT), mass=2000.0)
+            for soil in SoilSpread(samples=5).soils(SOIL)]
+    block = soft[0].channels.index('block_z')
+    speed = np.array([300.0, 2500.0])
+    size = np.array([np.abs(model.unbalance_response(speed, UNBALANCE).displacement[:, block])
+                     for model in soft])
+    ratio = size.max(axis=0) / size.min(axis=0)
+    assert ratio[0] > 1.3
+    assert ratio[1] < 1.01
+
+
+def test_outside_its_speeds_there_is_no_band(envelope):
+    found = envelope.at(np.array([1.0, math.nan, 1e4, 100.0]))
+    assert np.isnan(found.high[:3]).all()
+    assert np.isfinite(found.high[3]).all()
+    assert not found.holds(np.zeros((4, 18), dtype=complex))[:3].any()
+
+
+def test_spread_holds_the_given_soil_and_both_extremes():
+    soils = SPREAD.soils(SOIL)
+    assert len(soils) == 12
+    assert soils[0] == SOIL
+    modulus = np.array([soil.shear_modulus for soil in soils]) / SOIL.shear_modulus
+    assert (modulus.min(), modulus.max()) == (0.5, 2.0)
+    assert soils == SPREAD.soils(SOIL)
+    assert {soil.density for soil in soils} == {SOIL.density}
+    assert max(abs(soil.poisson_ratio - 0.25) for soil in soils) <= 0.05
+    assert max(abs(soil.loss_factor - 0.10) for soil in soils) <= 0.03
+
+
+@pytest.mark.parametrize('change, rule', [
+    ({'shear_modulus_factor': 0.5}, 'shear_modulus_factor must be >= 1 and finite, got 0.5'),
+    ({'poisson_ratio': math.nan}, r'poisson_ratio must be in \[0, 0.5\)'),
+    ({'loss_factor': -0.1}, r'loss_factor must be in \[0, 1\)'),
+    ({'samples': 2}, 'samples must be at least 3, got 2')])
+def test_impossible_spread_is_refused(change, rule):
+    with pytest.raises(RotorSoilError, match=rule):
+        SoilSpread(**change)
+
+
+
+
+def test_envelope_at_one_speed_has_the_bits_of_many():
+    random = np.random.default_rng(4)
+    edges = np.sort(random.uniform(10.0, 100.0, 30))
+    envelope = Envelope(edges, *random.normal(size=(4, 30, 5)))
+    speed = np.concatenate([random.uniform(0.0, 110.0, 200), edges, [np.nan]])
+    together = envelope.at(speed)
+    for name in ('low', 'high', 'behind', 'ahead'):
+        apart = [getattr(envelope.at(speed[row:row + 1]), name) for row in range(len(speed))]
+        np.testing.assert_array_equal(np.concatenate(apart), getattr(together, name))
+    inside = (speed >= edges[0]) & (speed <= edges[-1])
+    assert np.isfinite(together.low).all(axis=1).tolist() == inside.tolist()
+    np.testing.assert_allclose(together.low[200:230], envelope.low, rtol=1e-9, atol=1e-9)

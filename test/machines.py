@@ -1,0 +1,112 @@
+"""The seed paper's machine, and pieces of it, for the tests."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.soil import DOFS, Rectangle, Soil
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection
+from rotorsoil_ros.rotor.bearing import Pedestal, SpeedTable
+
+REFERENCE = Path(__file__).resolve().parent / 'reference'
+STEEL = Material(2.09e11, 0.3, 7920.0)
+# From I = 7887 mm^4 and 1.9 kg of shaft: the rounded figures of the paper move peaks by 1 %.
+DIAMETER = (64.0 * 7887e-12 / math.pi) ** 0.25
+LENGTH = 1.9 / (STEEL.density * math.pi / 4.0 * DIAMETER**2)
+SOIL = Soil(48e6, 0.25, 1900.0, 0.10)
+CONTACT = Rectangle(0.5, 0.5)
+CONE = ConeModel(SOIL, CONTACT)
+
+
+def bearing(name, position, *, stiffness, damping=0.0, foundation='block'):
+    """Return an isotropic bearing, or one of given 2 x 2 matrices."""
+    return Bearing(name, position, foundation,
+                   stiffness * np.eye(2) if np.ndim(stiffness) == 0 else np.array(stiffness),
+                   damping * np.eye(2) if np.ndim(damping) == 0 else np.array(damping))
+
+
+def uniform_rotor(*, length, diameter, elements, material, discs=(), bearings, height=0.0):
+    """Return a rotor of one cylindrical section."""
+    section = ShaftSection(length, (diameter, diameter), (0.0, 0.0), elements, material)
+    return Rotor(height, (section,), tuple(discs), tuple(bearings))
+
+
+def paper_rotor(*, stiffness=1e9, damping=5e2, elements=28, foundation='block'):
+    """Return the seed paper's rotor in its default geometry."""
+    return uniform_rotor(
+        length=LENGTH, diameter=DIAMETER, elements=elements, material=STEEL, height=0.6,
+        discs=[Disc('disc_1', LENGTH / 4, 0.7, 1e-3, 2e-3),
+               Disc('disc_2', LENGTH, 1.6, 3.2e-3, 6.4e-3)],
+        bearings=[bearing('bearing_1', 0.0, stiffness=stiffness, damping=damping,
+                          foundation=foundation),
+                  bearing('bearing_2', 0.75 * LENGTH, stiffness=stiffness, damping=damping,
+                          foundation=foundation)])
+
+
+def paper_machine(soil_model=CONE, *, mass=42.0, **rotor):
+    """Return the seed paper's machine on one block."""
+    inertia = mass / 12.0
+    block = Foundation('block', CONTACT, 0.375 * LENGTH, mass, 0.0,
+                       (inertia, inertia, 2.0 * inertia))
+    return CoupledModel(paper_rotor(**rotor), (block,), (soil_model,))
+
+
+class Restrained:
+    """A soil that holds all but the named degrees of freedom."""
+
+    def __init__(self, model, *dofs):
+        self.model = model
+        self.free = np.array([1.0 if dof in dofs else 0.0 for dof in DOFS])
+
+    def compliance(self, omega):
+        """Return the compliance with zero rows for what is held."""
+        return self.model.compliance(omega) * self.free[:, None] * self.free
+
+
+class Springs:
+    """A soil of springs and dashpots, whose modes a linear eigenproblem has."""
+
+    def __init__(self, stiffness, damping):
+        self.stiffness = np.array(stiffness)
+        self.damping = np.array(damping)
+
+    def compliance(self, omega):
+        """Return (K + i omega C)^-1."""
+        omega = np.asarray(omega)[:, None, None]
+        return np.linalg.inv(self.stiffness + 1j * omega * self.damping)
+
+
+def elastic_machine(soils=None):
+    """Return two blocks, two of three bearings on pedestals, one of them a table over speed."""
+    stiffness = np.array([[2e8, 5e7], [-5e7, 1e8]])
+    damping = np.array([[4e4, 1e3], [-1e3, 2e4]])
+    growth = np.linspace(0.5, 1.5, 6)[:, None, None]
+    speeds = np.linspace(0.0, 1000.0, 6)
+    skew = Pedestal(np.array([[40.0, 5.0], [5.0, 60.0]]), np.array([[3e8, 2e7], [1e7, 5e8]]),
+                    np.array([[2e4, 0.0], [3e3, 3e4]]))
+    plain = Pedestal(30.0 * np.eye(2), 4e8 * np.eye(2), 1e4 * np.eye(2))
+    rotor = Rotor(
+        0.9, (ShaftSection(2.0, (0.08, 0.10), (0.0, 0.02), 10, STEEL),),
+        (Disc('wheel', 0.8, 60.0, 1.5, 2.9), Disc('coupling', 2.0, 12.0, 0.1, 0.2)),
+        (Bearing('one', 0.1, 'left', stiffness, damping, skew),
+         Bearing('two', 1.4, 'right', SpeedTable(speeds, 0.75 * stiffness * growth),
+                 SpeedTable(speeds, damping / growth)),
+         Bearing('three', 1.9, 'right', 3e8 * np.eye(2), 1e4 * np.eye(2), plain)),
+        (Probe('probe', 0.55),))
+    blocks = (Foundation('left', Rectangle(0.5, 0.4), 0.1, 900.0, 0.3, (60.0, 70.0, 80.0)),
+              Foundation('right', Rectangle(0.5, 0.6), 1.6, 1500.0, 0.35, (90.0, 95.0, 120.0)))
+    if soils is None:
+        soils = tuple(ConeModel(SOIL, block.contact) for block in blocks)
+    return CoupledModel(rotor, blocks, soils, couples=('coupling',))
+
+
+def springy_soils():
+    """Return two soils of springs and dashpots, sliding and rocking coupled."""
+    stiffness = np.diag([2e8, 1.8e8, 2.6e8, 6e7, 7e7, 9e7])
+    stiffness[0, 4] = stiffness[4, 0] = 2e7
+    damping = np.diag([4e5, 4e5, 9e5, 3e4, 5e4, 4e4])
+    return Springs(stiffness, damping), Springs(1.3 * stiffness, 0.7 * damping)

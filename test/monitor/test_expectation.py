@@ -1,0 +1,87 @@
+"""What a case leads one to expect, and that a band costs no solution of the soil."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.models import coupled_model
+from rotorsoil_ros.ground.elements import tabulate as elements_tabulate
+from rotorsoil_ros.machine.band import SoilSpread
+from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.units import rad_s_to_rpm
+
+CASES = Path(__file__).parents[2] / 'config'
+FEW = SoilSpread(samples=5)
+
+
+@pytest.fixture(scope='module')
+def fan(tmp_path_factory):
+    """Return what to expect of the fan."""
+    return Expectation.of(load(CASES / 'plant_fan.yaml'), tmp_path_factory.mktemp('cache'), FEW)
+
+
+def test_lowest_natural_speeds_are_told_by_direction(fan):
+    # `check` lists 1253 rpm, a motion along x, and 1389 rpm, one along z.
+    assert rad_s_to_rpm(fan.lowest_natural_speed('x')) == pytest.approx(1253.2, abs=0.1)
+    assert rad_s_to_rpm(fan.lowest_natural_speed('z')) == pytest.approx(1388.9, abs=0.1)
+
+
+def test_support_without_a_mode_below_is_rigid(tmp_path):
+    case = load(CASES / 'rk4_rotor_kit.yaml', ['speed_range_rpm=[100, 300]'])
+    found = Expectation.of(case, tmp_path, FEW)
+    assert found.lowest_natural_speed('z') == math.inf
+    assert found.band is None
+
+
+def test_unbalance_counts_from_its_stamp_on(fan):
+    stamps, speed = np.array([10, 20, 30, 40]), np.full(4, 100.0)
+    one, two = np.array([0.0, 0.028]), np.array([0.0, 0.056])
+    found = fan.reference(stamps, speed, [(15, one), (30, two)])
+    column = fan.table.channels.index('fan_end_housing_z')
+    size = np.abs(found.displacement[:, column])
+    np.testing.assert_allclose(size / size[0], [1.0, 1.0, 2.0, 2.0])
+    np.testing.assert_allclose(found.high[:, column] / found.high[0, column],
+                               [1.0, 1.0, 2.0, 2.0])
+    assert np.all((found.low[:, column] <= size) & (size <= found.high[:, column]))
+
+
+def test_speed_out_of_the_table_has_no_prediction(fan):
+    found = fan.reference(np.array([0, 1]), np.array([1.0, 100.0]), [(0, np.zeros(2))])
+    assert np.isnan(found.displacement[0]).all()
+    assert np.isnan(found.high[0]).all()
+    assert np.isfinite(found.displacement[1]).all()
+
+
+@pytest.mark.slow
+def test_band_of_infinite_elements_solves_no_soil(tmp_path, monkeypatch):
+    case = load(CASES / 'plant_fan.yaml', ['support.model=infinite_elements'])
+    coupled_model(case, tmp_path)
+
+    def refuse(*arguments, **options):
+        raise AssertionError('the soil was solved again')
+
+    monkeypatch.setattr(elements_tabulate, 'tabulate', refuse)
+    found = Expectation.of(case, tmp_path, FEW)
+    assert found.band is not None
+    assert len(found.band.tables) == 5
+
+
+def test_comparison_goes_on_where_a_table_does_not_determine_the_modes(tmp_path):
+    dofs, stiffness = ('xx', 'yy', 'zz', 'rxrx', 'ryry', 'rzrz'), np.array(
+        [1.2e8, 1.2e8, 1.4e8, 3e7, 3e7, 5e7])
+    rows = ['omega_rad_s,' + ','.join(f'{dof}_re,{dof}_im' for dof in dofs)]
+    for number, omega in enumerate(np.linspace(6.0, 1000.0, 30)):
+        jumping = (1.0 + 0.3 * (-1.0) ** number) * stiffness
+        rows.append(f'{omega},' + ','.join(f'{each},{0.15 * each}' for each in jumping))
+    (tmp_path / 'jumping.csv').write_text('\n'.join(rows) + '\n')
+    case = load(CASES / 'paper_rotor.yaml', [
+        'support={model: table, file: ' + str(tmp_path / 'jumping.csv') + '}',
+        'foundations.0.mass=4200'])
+    found = Expectation.of(case, tmp_path)
+    assert found.modes == ()
+    assert 'critical speeds of the model are not known' in found.note
+    prediction = found.reference(np.array([0]), np.array([300.0]), [(0, case.unbalance)])
+    assert np.isfinite(prediction.displacement[0]).any()

@@ -1,0 +1,53 @@
+"""What the documents and examples say of the node is what the node has."""
+
+from pathlib import Path
+import re
+
+import yaml
+
+from rotorsoil_ros.node.parameters import OF_MACHINE, OWN
+
+from test_node import Bench, bench
+
+__all__ = ['bench']
+
+ROOT = Path(__file__).parents[2]
+# With use_sim_time; when a sensor publishes.
+NOT_ALWAYS = {'/clock', '/fan/measured/disc_1_x/imu'}
+
+
+def test_the_security_policy_is_exactly_for_what_the_node_has(bench: Bench):
+    node = bench.active('fan')
+    policy = re.search(r'<policy.*</policy>', (ROOT / 'docs' / 'security.md').read_text(),
+                       re.DOTALL)[0]
+
+    def named(kind, allowed):
+        section = re.search(rf'<{kind}s {allowed}="ALLOW">(.*?)</{kind}s>', policy, re.DOTALL)[1]
+        return {node.resolve_topic_name(name)
+                for name in re.findall(rf'<{kind}>(.*?)</{kind}>', section)}
+
+    def own(names):
+        return {name for name, _ in names(node.get_name(), '/')}
+
+    assert named('topic', 'publish') == own(node.get_publisher_names_and_types_by_node)
+    services = own(node.get_service_names_and_types_by_node)
+    assert named('service', 'reply') == services
+    heard = own(node.get_subscriber_names_and_types_by_node)
+    assert named('topic', 'subscribe') - NOT_ALWAYS == heard
+
+
+def test_the_example_of_parameters_names_only_parameters_of_the_node():
+    example = yaml.safe_load((ROOT / 'launch' / 'rotorsoil.yaml').read_text())
+    given = example['rotorsoil']['ros__parameters']
+    machines = {name: given.pop(name) for name in given['machines']}
+    for name, value in given.items():
+        if isinstance(value, dict):
+            assert all(not OWN[f'{name}.{key}'].fault(entry) for key, entry in value.items())
+        else:
+            assert not OWN[name].fault(value)
+    assert all(set(machine) <= set(OF_MACHINE) for machine in machines.values())
+
+
+def test_every_parameter_is_told_in_the_documents():
+    told = (ROOT / 'docs' / 'operations.md').read_text() + (ROOT / 'README.md').read_text()
+    assert [name for name in OWN if f'`{name}`' not in told] == []

@@ -1,0 +1,188 @@
+"""What happens in a graph that is not as it should be, and when a case changes under way."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from rotorsoil_ros.bags import reader as bag_reader
+
+from test_node import assert_answers, Bench, bench, exact, joint_state, LATCHED, STAMP, stamp_ns
+
+__all__ = ['bench']
+
+
+@pytest.fixture
+def case(bench, tmp_path):
+    """Return a case file that may be changed."""
+    path = tmp_path / 'fan.yaml'
+    with open(bench.case_file, encoding='utf-8') as source:
+        path.write_text(source.read())
+    return path
+
+
+def reload(bench, machine='fan'):
+    return bench.call(Trigger, f'/rotorsoil/{machine}/reload', Trigger.Request())
+
+
+def ask(bench, publish, amplitude, speed, step):
+    before = len(amplitude)
+    publish(joint_state([speed], stamp=STAMP + step))
+    bench.graph.until(lambda: len(amplitude) > before, 'the answer')
+    return amplitude[-1]
+
+
+def test_a_case_is_reloaded_while_speeds_are_answered(bench, case, machine):
+    node = bench.active('fan', fan__case=str(case))
+    amplitude, _ = bench.answers()
+    model = bench.hear('/rotorsoil/fan/model', String, LATCHED)
+    publish = bench.speaker()
+    node.set_parameters([Parameter('fan.unbalance.disc_2.moment', value=2e-5)])
+    old = ask(bench, publish, amplitude, 300.0, 0)
+    case.write_text(case.read_text().replace('mass: 42.0', 'mass: 420.0'))
+    answer, asked = reload(bench), 0
+    assert answer.success, answer.message
+    assert not reload(bench).success  # one is under way
+    answered = [old]
+    while answered[-1].position == old.position:  # it computes, and speeds are answered
+        asked += 1
+        answered.append(ask(bench, publish, amplitude, 300.0, asked))
+    assert asked > 5
+    new = answered[-1]
+    assert node.get_parameter('fan.unbalance.disc_2.moment').value == 2e-5  # what was set stays
+    new_key = node._watches[0].monitor.table.key
+    assert new_key != machine.table.key
+    bench.graph.until(lambda: model and json.loads(model[-1].data)['tables'] == {
+        'response': new_key}, 'the new model')
+    again = ask(bench, publish, amplitude, 300.0, asked + 2)
+    assert again.position == new.position
+
+
+def test_a_case_that_is_wrong_is_refused_and_the_old_one_stays(bench, case):
+    bench.active('fan', fan__case=str(case))
+    amplitude, _ = bench.answers()
+    publish = bench.speaker()
+    old = ask(bench, publish, amplitude, 300.0, 0)
+    for text, complaint in ((case.read_text().replace('mass: 42.0', 'mass: -42.0'), 'mass'),
+                            ('{', 'fan.yaml')):
+        case.write_text(text)
+        answer = reload(bench)
+        assert not answer.success
+        assert complaint in answer.message
+        assert answer.message.endswith('the old case stays')
+    assert ask(bench, publish, amplitude, 300.0, 1).position == old.position
+
+
+def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, case, case_file):
+    graph.executor.shutdown()
+    graph.executor = SingleThreadedExecutor(context=graph.context)
+    graph.executor.add_node(graph.probe)
+    bench = Bench(graph, cache, case_file)
+    node = bench.active('fan', fan__case=str(case))
+    case.write_text(case.read_text().replace('disc_2', 'wheel'))
+    assert reload(bench).success
+    bench.graph.until(lambda: 'wheel_x' in node._watches[0].monitor.table.channels, 'the swap')
+    assert node.has_parameter('fan.unbalance.wheel.moment')
+    assert not node.has_parameter('fan.unbalance.disc_2.moment')
+    amplitude, _ = bench.answers()
+    assert 'wheel_x' in ask(bench, bench.speaker(), amplitude, 300.0, 0).name
+    node.release()
+
+
+def test_two_publishers_of_one_speed_are_warned_of_by_name(bench, capfd):
+    node = bench.active('fan')
+    rival = bench.graph.add(Node('rival', context=bench.graph.context))
+    rival.create_publisher(Float64, '/fan/rotor/speed', 10)
+    bench.probe.create_publisher(JointState, '/fan/joint_states', 10)
+    seen = []
+
+    def warned():
+        seen.append(capfd.readouterr().err)
+        return '/probe on /fan/joint_states, /rival on /fan/rotor/speed' in ''.join(seen)
+
+    bench.graph.until(warned, 'the warning')
+    assert node._watches[0].monitor.health.publishers == 2
+    bench.graph.nodes.remove(rival)
+    rival.destroy_node()
+
+
+def test_a_foreign_type_on_a_topic_of_the_node_harms_nobody(bench, graph):
+    stranger = Context()
+    rclpy.init(args=[], context=stranger, domain_id=graph.context.get_domain_id())
+    other = Node('stranger', context=stranger)
+    other.create_publisher(String, '/fan/joint_states', 10)
+    bench.active('fan')
+    bench.graph.until(lambda: bench.probe.count_publishers('/fan/joint_states'), 'the stranger')
+    amplitude, _ = bench.answers()
+    publish = bench.speaker('/fan/rotor/speed', Float64)
+    publish(Float64(data=300.0))
+    bench.graph.until(lambda: amplitude, 'the answer')
+    other.destroy_node()
+    stranger.try_shutdown()
+
+
+def test_stamps_that_stand_still_or_jump_back_are_answered_and_counted(bench, machine, tmp_path):
+    node = bench.active('fan', log__directory=str(tmp_path), log__split_s=100.0)
+    amplitude, phase = bench.answers()
+    publish = bench.speaker()
+    stamps = [STAMP, STAMP, STAMP - 10**9, STAMP + 1, 0]
+    for stamp in stamps:
+        publish(joint_state([300.0], stamp=stamp))
+    bench.graph.until(lambda: len(amplitude) == len(phase) == 5, 'the answers')
+    assert [stamp_ns(message) for message in amplitude] == stamps
+    assert_answers(amplitude[2], phase[2], exact(machine, 300.0))
+    counts = node._watches[0].monitor.health.counts
+    assert (counts['repeated_stamp'], counts['backward_stamp'], counts['answered']) == (1, 2, 5)
+    node._tick()
+    node._tick()
+    node.release()
+    assert len(bag_reader.files(tmp_path / 'run')) == 2  # one split, not one each second
+
+
+def test_time_that_runs_a_hundred_times_faster_changes_no_answer(bench, machine):
+    node = bench.active('fan', use_sim_time=True)
+    amplitude, phase = bench.answers()
+    publish = bench.speaker()
+    clock = bench.probe.create_publisher(Clock, '/clock', QoSProfile(depth=10))
+    bench.graph.until(clock.get_subscription_count, 'who listens to the clock')
+    now_ns = STAMP
+    speeds = np.linspace(100.0, 800.0, 100)
+    for step, speed in enumerate(speeds):
+        now_ns += 10**8  # every millisecond
+        said = Clock()
+        said.clock.sec, said.clock.nanosec = divmod(now_ns, 10**9)
+        clock.publish(said)
+        publish(joint_state([speed], stamp=now_ns))
+        bench.graph.until(lambda step=step: len(amplitude) > step, 'the answer')
+    bench.graph.until(lambda: len(phase) == 100, 'the answers')
+    for row, speed in enumerate(speeds):
+        assert_answers(amplitude[row], phase[row], exact(machine, speed))
+    bench.graph.until(lambda: node.get_clock().now().nanoseconds == now_ns, 'the clock')
+    bare = bench.speaker('/fan/rotor/speed', Float64)
+    bare(Float64(data=300.0))
+    bench.graph.until(lambda: len(amplitude) == 101, 'the answer')
+    assert stamp_ns(amplitude[-1]) == now_ns
+
+
+def test_nobody_who_is_told_nonsense_gives_another_number(bench, machine):
+    bench.active('fan')
+    amplitude, phase = bench.answers()
+    publish = bench.speaker()
+    for garbage in (b'', b'\0', b'\0\1\0\0', bytes(100), b'\0\1\0\0' + b'\xff' * 60):
+        publish(garbage)
+    publish(joint_state([math.nan]))
+    publish(joint_state([300.0], stamp=STAMP + 1))
+    bench.graph.until(lambda: amplitude and stamp_ns(amplitude[-1]) == STAMP + 1, 'the answer')
+    bench.graph.until(lambda: len(phase) == len(amplitude), 'the phase')
+    assert_answers(amplitude[-1], phase[-1], exact(machine, 300.0))

@@ -1,0 +1,17 @@
+"""Units against their definitions."""
+
+import math
+
+import pytest
+
+from rotorsoil_ros import units
+
+
+def test_one_turn_per_second_is_sixty_rpm():
+    assert units.rpm_to_rad_s(60.0) == pytest.approx(2.0 * math.pi, rel=1e-15)
+    assert units.hz_to_rad_s(1.0) == pytest.approx(2.0 * math.pi, rel=1e-15)
+
+
+def test_conversions_undo_each_other():
+    assert units.rad_s_to_rpm(units.rpm_to_rad_s(1234.5)) == pytest.approx(1234.5, rel=1e-15)
+    assert units.rad_s_to_hz(units.hz_to_rad_s(12.5)) == pytest.approx(12.5, rel=1e-15)
