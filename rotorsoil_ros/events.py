@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.prediction import Prediction
 
 NANOSECONDS = 1_000_000_000
@@ -87,7 +88,7 @@ class Samples:
     """Raw acceleration (n,) [m/s^2] of one channel at its stamps (n,) [ns]."""
 
     machine: str
-    channel: str
+    channel: Channel
     stamp_ns: IntArray
     acceleration: FloatArray
 
@@ -133,7 +134,7 @@ class Compared:
         Name of the machine.
     stamp_ns, speed : (n,) arrays
         Of the measurement [ns]; told nearest to it [rad/s].
-    channels : tuple of str
+    channels : tuple of Channel
         Where; each of them is predicted.
     amplitude, phase : (n, channels) float array
         Measured, less runout where it is known [m, rad], [rad]; phases NaN where unknown.
@@ -149,7 +150,7 @@ class Compared:
     machine: str
     stamp_ns: IntArray
     speed: FloatArray
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     amplitude: FloatArray
     phase: FloatArray
     deviation: FloatArray
@@ -170,8 +171,8 @@ class Zoned:
 
     machine: str
     stamp_ns: int
-    predicted: Mapping[str, str]
-    measured: Mapping[str, str]
+    predicted: Mapping[Channel, str]
+    measured: Mapping[Channel, str]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.soil import DOFS, Rectangle, Soil
+from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection

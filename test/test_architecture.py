@@ -159,6 +159,45 @@ def test_units_is_the_only_60():
     assert sixties == []
 
 
+# What takes a string apart at an underscore, and what tells a part by how a name ends.
+AT_UNDERSCORES = {'split', 'rsplit', 'partition', 'rpartition'}
+BY_ENDS = {'endswith', 'startswith', 'removesuffix', 'removeprefix'}
+ENDS = re.compile(r'_?(journal|housing)?_?(x|y|z|rx|ry|rz)?')
+SPELLED = re.compile(r"f'.*_(journal|housing)(_.*)?'|f'.+\}_(\{(axis|dof)\}|x|z|rx|ry|rz)'")
+
+
+def channels_spelled_in(path):
+    """Yield the lines on which a room makes a channel of strings or takes it apart."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.args:
+            first = getattr(node.args[0], 'value', None)
+            if (node.func.attr in AT_UNDERSCORES and first == '_') or (
+                    node.func.attr in BY_ENDS and isinstance(first, str) and first
+                    and ENDS.fullmatch(first)):
+                yield node.lineno
+        elif isinstance(node, ast.Subscript):
+            if ast.unparse(node.value).split('.')[-1] == 'channel':
+                yield node.lineno
+        elif isinstance(node, ast.JoinedStr) and SPELLED.fullmatch(ast.unparse(node)):
+            yield node.lineno
+
+
+@pytest.mark.parametrize('path', [path for path in ROOMS if path.name != 'channel.py'],
+                         ids=name_of)
+def test_no_room_takes_a_channel_apart(path):
+    assert list(channels_spelled_in(path)) == []
+
+
+@pytest.mark.parametrize('line', [
+    "axis = name.rpartition('_')[2]", "turns = name.rsplit('_', 1)[1]", 'axis = channel[-1]',
+    "moving = name.endswith('_x')", "kind = motion.startswith('housing')",
+    "name = f'{bearing.name}_housing_{axis}'", "name = f'{disc}_{axis}'", "name = f'{disc}_x'",
+    "label = name.removesuffix('_journal')"])
+def test_channel_that_is_taken_apart_is_seen(line, tmp_path):
+    (tmp_path / 'room.py').write_text(line)
+    assert list(channels_spelled_in(tmp_path / 'room.py')) == [1]
+
+
 def test_nothing_below_the_node_reads_the_clock():
     readers = {name_of(path) for path in ROOMS if wing_of(name_of(path)) not in ('node', 'cli')
                and {'time', 'datetime'} & set(imported_by(path))}

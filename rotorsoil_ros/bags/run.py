@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.orders import order_vectors, OrderVector, SpeedTrack, turns_with
@@ -213,11 +214,11 @@ def _at(stamp_ns: IntArray, series: tuple[IntArray, FloatArray] | None) -> Float
 
 def _predictions(
     contents: _Contents, stamp_ns: IntArray,
-) -> tuple[tuple[str, ...], npt.NDArray[Any]]:
+) -> tuple[tuple[Channel, ...], npt.NDArray[Any]]:
     """Return the displacements that a node answered at the stamps of the speeds."""
     amplitudes = _joined(contents.states['amplitude'], 'position')
     phases = _joined(contents.states['phase'], 'position')
-    channels = tuple(dict.fromkeys(
+    channels = tuple(Channel.parse(name) for name in dict.fromkeys(
         name for states in contents.states['amplitude'] for name in states.names))
     displacement = np.full((len(stamp_ns), len(channels)), complex(np.nan, np.nan))
     for column, name in enumerate(channels):
@@ -250,7 +251,7 @@ def _demodulated(
     speed: FloatArray, angle: FloatArray, turns: float,
 ) -> Iterator[tuple[int, OrderVector]]:
     """Yield stamp and vectors of raw samples, as far as the speed is known."""
-    axis = channel.rpartition('_')[2]
+    axis = Channel.parse(channel).axis
     if axis not in AXES or not parts or len(stamp_ns) < 2:
         return
     samples_ns = np.concatenate([stamps for stamps, _ in parts])

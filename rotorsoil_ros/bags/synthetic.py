@@ -9,6 +9,7 @@ from sensor_msgs.msg import Imu
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.bags.writer import LogFile
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.machine.band import on_soils
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -134,13 +135,12 @@ def _speeds(machine: str, stamp_ns: IntArray, speed: FloatArray, angle: FloatArr
 
 
 def _acceleration(
-    channel: str, shaken: Shaking, noise: float, random: np.random.Generator,
+    channel: Channel, shaken: Shaking, noise: float, random: np.random.Generator,
 ) -> FloatArray:
     """Return what a sensor feels along the axes of the machine, (n, 3) [m/s^2]."""
-    station = channel.rpartition('_')[0]
     felt = np.zeros((len(shaken.acceleration), 3))
     for axis, column in (('x', 0), ('z', 2)):
-        clean = shaken.acceleration[:, shaken.channels.index(f'{station}_{axis}')]
+        clean = shaken.acceleration[:, shaken.channels.index(replace(channel, axis=axis))]
         deviation = noise * float(np.sqrt(np.mean(clean**2)))
         felt[:, column] = clean + random.normal(scale=deviation, size=len(clean))
     felt[:, 2] += GRAVITY

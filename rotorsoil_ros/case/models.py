@@ -116,7 +116,8 @@ def stored_response_table(
     """Return the response table of a case if the cache holds it."""
     key = response_key(case, model)
     arrays = Cache(directory).load('response', key)
-    return None if arrays is None else ResponseTable.from_arrays(arrays, key=key)
+    return None if arrays is None else ResponseTable.from_arrays(
+        arrays, model.channels, key=key)
 
 
 def response_table(case: Case, model: CoupledModel, directory: Path) -> ResponseTable:

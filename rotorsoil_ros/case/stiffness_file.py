@@ -8,8 +8,8 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError, RotorSoilError
-from rotorsoil_ros.ground.soil import DOFS
 from rotorsoil_ros.ground.table import ComplianceTable, PASSIVITY, RECIPROCITY
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz
 

@@ -5,8 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
-from rotorsoil_ros.ground.soil import DOFS, equivalent_radii, Rectangle, Soil, SoilModel
+from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import rad_s_to_rpm
 

@@ -21,6 +21,7 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.channel import across, Channel, HOUSING
 from rotorsoil_ros.cli.demo_comparison import demonstrate_comparison
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import RotorSoilError
@@ -46,7 +47,7 @@ class _Answers:
 
     stamp_ns: IntArray
     speed: FloatArray
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     amplitude: FloatArray
 
 
@@ -131,7 +132,7 @@ def _read(log: Path) -> _Answers:
     speeds: dict[int, float] = {}
     stamps: list[int] = []
     rows: list[FloatArray] = []
-    channels: tuple[str, ...] = ()
+    channels: tuple[Channel, ...] = ()
     wanted = {f'/{MACHINE}/joint_states', f'/rotorsoil/{MACHINE}/amplitude'}
     for source, _, payload in bag_reader.messages(log, lambda topic, _: topic in wanted):
         message = deserialize_message(bytes(payload), JointState)
@@ -139,7 +140,7 @@ def _read(log: Path) -> _Answers:
         if source.topic.endswith('/joint_states'):
             speeds[stamp_ns] = message.velocity[0]
         else:
-            channels = tuple(message.name)
+            channels = tuple(map(Channel.parse, message.name))
             stamps.append(stamp_ns)
             rows.append(np.array(message.position))
     return _Answers(np.array(stamps), np.array([speeds[stamp] for stamp in stamps]), channels,
@@ -164,8 +165,8 @@ def _summarise(case: Case, answers: _Answers, out: Path, log: Path) -> None:
     sent = len(speed_profile(0)[0])
     print(f'{sent} speeds sent over DDS, {len(answers.stamp_ns)} answered and logged')
     print('largest amplitudes, zero-to-peak:')
-    names = [f'{bearing.name}_housing_{axis}' for bearing in case.rotor.bearings for axis in 'xz']
-    names += [f'{disc.name}_{axis}' for disc in case.rotor.discs for axis in 'xz']
+    names = [name for bearing in case.rotor.bearings for name in across(bearing.name, HOUSING)]
+    names += [name for disc in case.rotor.discs for name in across(disc.name)]
     for name in names:
         column = answers.amplitude[:, answers.channels.index(name)]
         at = int(np.nanargmax(column))

@@ -101,7 +101,7 @@ def _criticals(criticals: Sequence[CriticalSpeed]) -> list[tuple[str, str]]:
 
 
 def _peaks(case: Case, table: ResponseTable) -> Iterable[tuple[str, str]]:
-    moved = tuple(name for name in table.channels if name.rpartition('_')[2] in 'xyz')
+    moved = tuple(channel for channel in table.channels if not channel.is_rotation)
     peaks = resonances(table.predictor(case.unbalance), moved)
     for peak in peaks:
         yield (f'response peak {rad_s_to_rpm(peak.speed):.6g} rpm',

@@ -11,10 +11,11 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.cli.parser import Sweep
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.ground.soil import DOFS, SoilModel
+from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s

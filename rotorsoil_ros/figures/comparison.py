@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, FloatArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.figures.response import COLOURS
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.monitor.criteria import answer, Expectation
@@ -45,8 +46,8 @@ def _envelope(expectation: Expectation | None) -> Envelope | None:
     return expectation.envelope(expectation.case.unbalance)
 
 
-def _unit(channel: str) -> str:
-    return 'urad' if channel.rpartition('_')[2].startswith('r') else 'um'
+def _unit(channel: Channel) -> str:
+    return f'u{channel.unit}'
 
 
 def bode(comparison: Comparison, points: ChannelPoints, envelope: Envelope | None) -> Figure:
@@ -177,7 +178,7 @@ def polar(points: ChannelPoints, title: str) -> Figure:
 
 def trend(comparison: Comparison) -> Figure:
     """Draw speed, and housing velocity with its zone limits, or displacement, over time."""
-    housings = [points for points in comparison.points if '_housing_' in points.channel]
+    housings = [points for points in comparison.points if points.channel.is_housing]
     shown = (housings or comparison.points)[:_MOST_LINES]
     figure = Figure(figsize=(7.5, 5.8), layout='constrained')
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 2.6])

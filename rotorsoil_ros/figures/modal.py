@@ -10,6 +10,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import across
 from rotorsoil_ros.figures.response import COLOURS, draw_shape, FELT, tidy, title_of
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
@@ -162,10 +163,10 @@ def polar(case: Case, predictor: Predictor, peaks: Sequence[Peak]) -> Figure:
     for axes in grid.flat[len(discs):]:
         axes.remove()
     for name, axes in zip(discs, grid.flat, strict=False):
-        for colour, line, axis in zip(COLOURS, ('-', '--'), 'xz', strict=False):
-            values = response[:, predictor.channels.index(f'{name}_{axis}')]
+        for colour, line, channel in zip(COLOURS, ('-', '--'), across(name), strict=False):
+            values = response[:, predictor.channels.index(channel)]
             axes.plot(np.angle(values), _MICRO * np.abs(values), color=colour, linestyle=line,
-                      linewidth=1.0, label=f'{name}_{axis}')
+                      linewidth=1.0, label=channel)
         _mark_peaks(axes, predictor, name, peaks)
         axes.tick_params(labelsize=7)
         axes.set_rlabel_position(67.5)
@@ -180,7 +181,7 @@ def _mark_peaks(
     axes: Axes, predictor: Predictor, disc: str, peaks: Sequence[Peak],
 ) -> None:
     """Put a dot at every peak on the larger of both curves, and its speed where there is room."""
-    columns = [predictor.channels.index(f'{disc}_{axis}') for axis in 'xz']
+    columns = [predictor.channels.index(channel) for channel in across(disc)]
     speeds = np.array([peak.speed for peak in peaks])
     answers = predictor.predict(speeds).displacement[:, columns]
     near = _LEAST_LABELLED * np.abs(answers).max(initial=0.0)
@@ -202,7 +203,7 @@ def _mark_peaks(
 
 def mass_ratios(case: Case, model: CoupledModel) -> Figure:
     """Draw the response of the discs for blocks of other masses on the same soil."""
-    heaviest = max(case.rotor.discs, key=lambda disc: disc.mass).name
+    heaviest = across(max(case.rotor.discs, key=lambda disc: disc.mass).name)
     figure = Figure(figsize=(7.5, 6.0), layout='constrained')
     panels = figure.subplots(2, 1, sharex=True)
     rotating = case.rotor.mass
@@ -213,13 +214,13 @@ def mass_ratios(case: Case, model: CoupledModel) -> Figure:
         speed = resolved_speeds(predictor)
         response = predictor.predict(speed).displacement
         mass = sum(block.mass for block in blocks)
-        for axes, axis in zip(panels, 'xz', strict=True):
-            values = np.abs(response[:, predictor.channels.index(f'{heaviest}_{axis}')])
+        for axes, channel in zip(panels, heaviest, strict=True):
+            values = np.abs(response[:, predictor.channels.index(channel)])
             axes.semilogy(rad_s_to_rpm(speed), _MICRO * values, color=colour, linestyle=line,
                           linewidth=1.2, label=f'{mass:.5g} kg, {mass / rotating:.3g} times the '
                                                'rotor')
-    for axes, axis in zip(panels, 'xz', strict=True):
-        axes.set_ylabel(f'{heaviest}_{axis}, zero-to-peak [um]')
+    for axes, channel in zip(panels, heaviest, strict=True):
+        axes.set_ylabel(f'{channel}, zero-to-peak [um]')
         tidy(axes)
     panels[0].legend(fontsize=7, title='mass of the blocks', title_fontsize=7)
     panels[1].set_xlabel('speed [rpm]')

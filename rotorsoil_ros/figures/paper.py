@@ -9,8 +9,9 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import across, DOFS
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.soil import DOFS, RigidSoil, SoilModel
+from rotorsoil_ros.ground.soil import RigidSoil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import add_mass
 from rotorsoil_ros.machine.modes import campbell
@@ -116,7 +117,7 @@ def _modelling_technique(case: Case, supports: Mapping[str, SoilModel]) -> Paper
     columns: dict[str, FloatArray | ComplexArray] = {'frequency_hz': rad_s_to_hz(omega)}
     figure = Figure(figsize=(8.0, 5.0), layout='constrained')
     axes = figure.subplots()
-    channel = f'{case.rotor.discs[0].name}_x'
+    channel, _ = across(case.rotor.discs[0].name)
     for (name, model), colour in zip(models.items(), _COLOURS, strict=False):
         found = model.frequency_response(omega, speed=0.0, channel=channel)
         values = found.displacement[:, model.channels.index(channel)]
@@ -159,7 +160,7 @@ def _mass_ratios(case: Case, supports: Mapping[str, SoilModel]) -> PaperFigure:
     columns: dict[str, FloatArray | ComplexArray] = {'speed_hz': rad_s_to_hz(speed)}
     figure = Figure(figsize=(8.0, 5.0), layout='constrained')
     axes = figure.subplots()
-    channel = f'{case.rotor.discs[0].name}_x'
+    channel, _ = across(case.rotor.discs[0].name)
     for name, predictor in predictors.items():
         values = predictor.predict(speed).displacement[:, predictor.channels.index(channel)]
         columns[f'{channel} {name} [m]'] = values

@@ -10,11 +10,12 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import ACROSS, across, Channel, DOFS, HOUSING, JOURNAL
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.soil import Circle, DOFS
+from rotorsoil_ros.ground.soil import Circle
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
@@ -59,29 +60,29 @@ def all_figures(
 
 def main_peaks(case: Case, predictor: Predictor) -> list[Peak]:
     """Return the largest peaks of the machine's displacements, slowest first."""
-    moved = [name for kind, names in channel_groups(case).items() if kind != 'rocking'
-             for name in names]
+    moved = [channel for channels in channel_groups(case).values() for channel in channels
+             if not channel.is_rotation]
     peaks = sorted(resonances(predictor, tuple(moved)), key=lambda peak: -peak.amplitude)
     return sorted(peaks[:_LARGEST_DRAWN], key=lambda peak: peak.speed)
 
 
-def channel_groups(case: Case) -> dict[str, list[str]]:
+def channel_groups(case: Case) -> dict[str, list[Channel]]:
     """Return the channels that belong in one diagram, by what they are of."""
     rotor = case.rotor
     groups = {
-        'journals': [f'{bearing.name}_journal_{axis}' for bearing in rotor.bearings
-                     for axis in 'xz'],
-        'housings': [f'{bearing.name}_housing_{axis}' for bearing in rotor.bearings
-                     for axis in 'xz'
+        'journals': [channel for bearing in rotor.bearings
+                     for channel in across(bearing.name, JOURNAL)],
+        'housings': [channel for bearing in rotor.bearings
+                     for channel in across(bearing.name, HOUSING)
                      if case.support.model != 'rigid' or bearing.pedestal is not None],
-        'discs': [f'{disc.name}_{axis}' for disc in rotor.discs for axis in 'xz'],
-        'probes': [f'{probe.name}_{axis}' for probe in rotor.probes for axis in 'xz'],
+        'discs': [channel for disc in rotor.discs for channel in across(disc.name)],
+        'probes': [channel for probe in rotor.probes for channel in across(probe.name)],
     }
     if case.support.model != 'rigid':
-        names = [block.name for block in case.foundations]
-        groups['foundations'] = [f'{name}_{dof}' for name in names for dof in DOFS[:3]]
-        groups['rocking'] = [f'{name}_{dof}' for name in names for dof in DOFS[3:]]
-    return {kind: names for kind, names in groups.items() if names}
+        of_blocks = [Channel(block.name, '', dof) for block in case.foundations for dof in DOFS]
+        groups['foundations'] = [channel for channel in of_blocks if not channel.is_rotation]
+        groups['rocking'] = [channel for channel in of_blocks if channel.is_rotation]
+    return {kind: channels for kind, channels in groups.items() if channels}
 
 
 def support(case: Case, model: CoupledModel) -> Figure:
@@ -114,9 +115,8 @@ def support(case: Case, model: CoupledModel) -> Figure:
     return figure
 
 
-def bode(predictor: Predictor, channels: Sequence[str], title: str) -> Figure:
+def bode(predictor: Predictor, channels: Sequence[Channel], title: str) -> Figure:
     """Draw amplitude, zero-to-peak, and phase of channels of one unit over the speed."""
-    turns = channels[0].rpartition('_')[2] in DOFS[3:]
     speed = resolved_speeds(predictor)
     response = predictor.predict(speed).displacement
     figure = Figure(figsize=(7.5, 5.2), layout='constrained')
@@ -131,7 +131,7 @@ def bode(predictor: Predictor, channels: Sequence[str], title: str) -> Figure:
         x = rad_s_to_rpm(speed[moving])
         amplitude.semilogy(x, _MICRO * np.abs(values[moving]), **style)
         phase.plot(x, _without_jumps(np.rad2deg(np.angle(values[moving]))), **style)
-    amplitude.set_ylabel(f'amplitude, zero-to-peak [{"urad" if turns else "um"}]')
+    amplitude.set_ylabel(f'amplitude, zero-to-peak [u{channels[0].unit}]')
     phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
               yticks=range(-180, 181, 90))
     if amplitude.get_lines():
@@ -169,24 +169,25 @@ def drawn_criticals(
 def orbits(case: Case, predictor: Predictor, criticals: Sequence[CriticalSpeed]) -> Figure:
     """Draw the orbit of every station at critical speeds, a row for each."""
     rotor = case.rotor
-    stations = [*(f'{bearing.name}_journal' for bearing in rotor.bearings),
-                *(disc.name for disc in rotor.discs), *(probe.name for probe in rotor.probes)]
+    stations = [*(across(bearing.name, JOURNAL) for bearing in rotor.bearings),
+                *(across(disc.name) for disc in rotor.discs),
+                *(across(probe.name) for probe in rotor.probes)]
     figure = Figure(figsize=(max(1.9 * len(stations) + 0.6, 6.5), 2.4 * len(criticals) + 0.6),
                     layout='constrained')
     rows = figure.subfigures(len(criticals), 1, squeeze=False)[:, 0]
     for critical, row in zip(criticals, rows, strict=True):
         motion = predictor.predict(np.array([critical.speed])).displacement[0]
         every = row.subplots(1, len(stations), squeeze=False)[0]
-        for name, axes in zip(stations, every, strict=True):
-            x, z = (_over_a_turn(motion[predictor.channels.index(f'{name}_{axis}')])
-                    for axis in 'xz')
+        for channels, axes in zip(stations, every, strict=True):
+            x, z = (_over_a_turn(motion[predictor.channels.index(channel)])
+                    for channel in channels)
             axes.plot(x, z, color=COLOURS[0])
             axes.plot(x[0], z[0], 'o', color=COLOURS[1], markersize=4)
             axes.set_aspect('equal', adjustable='datalim')
             axes.tick_params(labelsize=6)
             axes.locator_params(nbins=4)
             axes.grid(alpha=0.3)
-            axes.set_title(name, fontsize=7)
+            axes.set_title(channels[0].place, fontsize=7)
             axes.set_xlabel('x [um]', fontsize=7)
         every[0].set_ylabel('z [um]', fontsize=7)
         row.suptitle(title_of(critical), fontsize=8)
@@ -205,7 +206,7 @@ def shapes(case: Case, model: CoupledModel, criticals: Sequence[CriticalSpeed]) 
     nodes = nodes[::1 + len(nodes) // _LARGEST_DRAWN_NODES]
     probes = tuple(Probe(f'node_{number}', place) for number, place in enumerate(nodes))
     everywhere = replace(model, rotor=replace(case.rotor, probes=probes))
-    first = everywhere.channels.index('node_0_x')
+    first = everywhere.channels.index(across(probes[0].name)[0])
     speed = np.array([critical.speed for critical in criticals])
     solved = everywhere.unbalance_response(speed, case.unbalance).displacement
     motion = solved[:, first:first + 2 * len(nodes)].reshape(len(criticals), -1, 2)
@@ -213,8 +214,9 @@ def shapes(case: Case, model: CoupledModel, criticals: Sequence[CriticalSpeed]) 
     rows = figure.subplots(len(criticals), 1, sharex=True, squeeze=False)[:, 0]
     for critical, whole, shape, axes in zip(criticals, solved, motion, rows, strict=True):
         angle = np.angle(shape.flat[np.abs(shape).argmax()])
-        housings = [[whole[everywhere.channels.index(f'{bearing.name}_housing_{axis}')]
-                     for axis in 'xz'] for bearing in case.rotor.bearings]
+        housings = [[whole[everywhere.channels.index(channel)]
+                     for channel in across(bearing.name, HOUSING)]
+                    for bearing in case.rotor.bearings]
         draw_shape(axes, case, nodes, _MICRO * np.real(shape * np.exp(-1j * angle)),
                    _MICRO * np.real(np.array(housings) * np.exp(-1j * angle)))
         axes.set_ylabel('deflection [um]', fontsize=8)
@@ -246,7 +248,7 @@ def draw_shape(
 
 
 def trend(
-    time_s: FloatArray, speed: FloatArray, amplitude: FloatArray, *, channels: Sequence[str],
+    time_s: FloatArray, speed: FloatArray, amplitude: FloatArray, *, channels: Sequence[Channel],
     title: str,
 ) -> Figure:
     """Draw speed (n,) [rad/s] and amplitudes (n, c) [m] of all that is not a rotation."""
@@ -254,8 +256,8 @@ def trend(
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 2.5])
     top.plot(time_s, rad_s_to_rpm(speed), color='black')
     top.set_ylabel('speed [rpm]')
-    moved = [index for index, name in enumerate(channels)
-             if name.rpartition('_')[2] in 'xz' and '_journal_' not in name]
+    moved = [index for index, channel in enumerate(channels)
+             if channel.axis in ACROSS and channel.part != JOURNAL]
     for number, index in enumerate(moved):
         bottom.semilogy(time_s, _MICRO * np.maximum(amplitude[:, index], _SMALLEST_DRAWN),
                         color=COLOURS[number // 2 % len(COLOURS)], linewidth=1.0,

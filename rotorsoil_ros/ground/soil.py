@@ -9,8 +9,6 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import require
 
-DOFS = ('x', 'y', 'z', 'rx', 'ry', 'rz')
-
 
 @dataclass(frozen=True, slots=True)
 class Soil:

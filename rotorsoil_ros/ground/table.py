@@ -6,8 +6,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
-from rotorsoil_ros.ground.soil import DOFS
 
 # Printed tables carry four digits; anything worse is a slip of a row or a sign.
 RECIPROCITY = 1e-3

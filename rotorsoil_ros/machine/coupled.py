@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.channel import across, Channel, DOFS, HOUSING, JOURNAL
 from rotorsoil_ros.errors import NotSolvedError, require, RotorSoilError
-from rotorsoil_ros.ground.soil import DOFS, SoilModel
+from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupling import Answer, answer
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.support import Support
@@ -68,15 +69,16 @@ class CoupledModel:
                        self.foundations, self.soil_models)
 
     @cached_property
-    def channels(self) -> tuple[str, ...]:
-        """Names of all motions, in the order of the last axis of a Prediction."""
+    def channels(self) -> tuple[Channel, ...]:
+        """All motions, in the order of the last axis of a Prediction."""
         rotor = self.rotor
-        names = [f'{bearing.name}_{part}_{axis}' for bearing in rotor.bearings
-                 for part in ('journal', 'housing') for axis in 'xz']
-        names += [f'{station.name}_{axis}' for station in rotor.stations[len(rotor.bearings):]
-                  for axis in 'xz']
-        names += [f'{foundation.name}_{dof}' for foundation in self.foundations for dof in DOFS]
-        return tuple(names)
+        found = [channel for bearing in rotor.bearings for part in (JOURNAL, HOUSING)
+                 for channel in across(bearing.name, part)]
+        found += [channel for station in rotor.stations[len(rotor.bearings):]
+                  for channel in across(station.name)]
+        found += [Channel(foundation.name, '', dof)
+                  for foundation in self.foundations for dof in DOFS]
+        return tuple(found)
 
     @cached_property
     def transmits_force(self) -> BoolArray:
@@ -88,7 +90,7 @@ class CoupledModel:
     @cached_property
     def groups(self) -> IntArray:
         """Kind of each channel and then of each transmitted force, (w,) int: same unit, same."""
-        turns = np.array([name.rsplit('_', 1)[1].startswith('r') for name in self.channels])
+        turns = np.array([channel.is_rotation for channel in self.channels])
         return np.concatenate([turns, 2 + turns[self.transmits_force]])
 
     @property

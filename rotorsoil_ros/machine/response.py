@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.pieces import evaluate, evaluate_one, Pieces, refine
@@ -37,8 +38,10 @@ class ResponseTable:
 
     Attributes
     ----------
-    channels, planes : tuple of str
-        Names of motions and of unbalance planes.
+    channels : tuple of Channel
+        The motions.
+    planes : tuple of str
+        Names of the unbalance planes.
     transmits_force : (c,) bool array
         Which channels have a force.
     pieces : Pieces
@@ -52,7 +55,7 @@ class ResponseTable:
 
     """
 
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     planes: tuple[str, ...]
     transmits_force: BoolArray
     pieces: Pieces
@@ -163,19 +166,21 @@ class ResponseTable:
         return worst
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Return everything but the key as plain arrays."""
+        """Return everything but the key and the channels as plain arrays."""
         return {
-            'channels': np.array(self.channels), 'planes': np.array(self.planes),
+            'planes': np.array(self.planes),
             'transmits_force': self.transmits_force, 'edges': self.pieces.edges,
             'resolved': self.pieces.resolved, 'coefficients': self.pieces.coefficients,
             'accuracy': np.array(self.accuracy),
         }
 
     @classmethod
-    def from_arrays(cls, arrays: dict[str, np.ndarray], *, key: str = '') -> 'ResponseTable':
-        """Rebuild a table from `to_arrays`."""
+    def from_arrays(
+        cls, arrays: dict[str, np.ndarray], channels: tuple[Channel, ...], *, key: str = '',
+    ) -> 'ResponseTable':
+        """Rebuild a table from `to_arrays` and the channels of its model."""
         return cls(
-            tuple(str(name) for name in arrays['channels']),
+            channels,
             tuple(str(name) for name in arrays['planes']),
             arrays['transmits_force'],
             Pieces(arrays['edges'], arrays['resolved'], arrays['coefficients']),
@@ -200,8 +205,8 @@ class Predictor:
     coefficients: FloatArray
 
     @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the motions."""
+    def channels(self) -> tuple[Channel, ...]:
+        """The motions."""
         return self.table.channels
 
     def covers(self, speed: FloatArray) -> BoolArray:

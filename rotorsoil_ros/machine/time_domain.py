@@ -11,6 +11,7 @@ import numpy as np
 import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.channel import across, Channel, HOUSING
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.rotor.assembly import Rotor
@@ -36,7 +37,7 @@ class Shaking:
         [s].
     speed, angle : (n,) float arrays
         Of the rotor [rad/s], [rad].
-    channels : tuple of str
+    channels : tuple of Channel
         Housings.
     acceleration : (n, c) float array
         [m/s^2].
@@ -46,7 +47,7 @@ class Shaking:
     time: FloatArray
     speed: FloatArray
     angle: FloatArray
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     acceleration: FloatArray
 
 
@@ -86,8 +87,8 @@ def shake(
     force = unbalance_force(angle[:, None] + phase, speed[:, None], rate[:, None], moment=moment)
     load = np.concatenate(force, axis=1) @ system.discs.T
     motion = _newmark(system, speed, load, step)
-    names = tuple(f'{bearing.name}_housing_{axis}' for bearing in model.rotor.bearings
-                  for axis in 'xz')
+    names = tuple(channel for bearing in model.rotor.bearings
+                  for channel in across(bearing.name, HOUSING))
     return Shaking(time, speed, angle, names, motion @ system.housings.T)
 
 

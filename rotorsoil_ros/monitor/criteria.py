@@ -15,6 +15,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.band import (
     depends_on_soil,
@@ -167,7 +168,6 @@ def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
 
 
 _KIND = 'criteria'
-_AXES = 'xz'
 _NICE = 19
 
 
@@ -193,7 +193,7 @@ class Criteria:
 
     def lowest_natural_speed(self, axis: str) -> float:
         """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
-        return self.natural_speeds[_AXES.index(axis)]
+        return self.natural_speeds[ACROSS.index(axis)]
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Return everything as plain arrays."""

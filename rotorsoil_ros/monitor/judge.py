@@ -9,6 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.events import (
     Band,
     Compared,
@@ -30,7 +31,7 @@ from rotorsoil_ros.monitor.points import ABOVE_NOISE, Matching, nearest
 from rotorsoil_ros.monitor.quasistatic import is_quasi_static, SLOPE_SAMPLES
 from rotorsoil_ros.monitor.rules import Rules
 from rotorsoil_ros.monitor.told import Verdict
-from rotorsoil_ros.monitor.zones import HOUSING, Vibration
+from rotorsoil_ros.monitor.zones import Vibration
 
 MOST_NAMES = 16
 REPEAT_NS = NANOSECONDS  # after which a band is told again although the speed has not moved
@@ -192,7 +193,7 @@ class Judge:
         halves = [vectors.displacement() for vectors in found]
         amplitude = np.array([half[0][known] for half in halves])
         phase = np.array([half[1][known] for half in halves])
-        names = tuple(channels[column] for column in known)
+        names = tuple(self._predictor.channels[column] for column in columns)
         amplitude, phase = self._runout.subtract(names, speed, amplitude, phase)
         low = high = np.full(amplitude.shape, np.nan)
         if self._envelope is not None:
@@ -205,7 +206,7 @@ class Judge:
 
     def _weigh(self, criteria: Criteria, compared: Iterable[Compared]) -> None:
         """Zone what was measured and predicted, and count what is inside the band."""
-        natural = {axis: criteria.lowest_natural_speed(axis) for axis in 'xz'}
+        natural = {axis: criteria.lowest_natural_speed(axis) for axis in ACROSS}
         for each in compared:
             self._vibration.measure(each, natural)
             self._vibration.compare(each, self._counting(each, criteria))
@@ -214,9 +215,9 @@ class Judge:
         if math.isfinite(speed):
             row = answer(self._predictor, np.array([speed]))[0]
             self._vibration.predict(
-                {name: speed * abs(row[column]) / math.sqrt(2.0)
-                 for column, name in enumerate(self._predictor.channels)
-                 if HOUSING in name and abs(row[column]) > 0.0}, speed, natural)
+                {channel: speed * abs(row[column]) / math.sqrt(2.0)
+                 for column, channel in enumerate(self._predictor.channels)
+                 if channel.is_housing and abs(row[column]) > 0.0}, speed, natural)
 
     def _counting(self, compared: Compared, criteria: Criteria) -> BoolArray:
         """Return which points may be held against the machine, (n, channels)."""
@@ -251,7 +252,7 @@ class Judge:
 
 def _joined(found: Sequence[Compared]) -> list[Compared]:
     """Return what was compared since the last tick, once for each set of channels."""
-    by_channels: dict[tuple[str, ...], list[Compared]] = {}
+    by_channels: dict[tuple[Channel, ...], list[Compared]] = {}
     for each in found:
         by_channels.setdefault(each.channels, []).append(each)
     arrays = {entry.name for entry in fields(Compared)} - {'machine', 'channels'}

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Compared, Level, Remark
 from rotorsoil_ros.monitor.history import History
 from rotorsoil_ros.monitor.passage import PeakPair, sweeps, told_once
@@ -47,7 +48,7 @@ class Trace:
         """Return some of it."""
         return Trace(*(getattr(self, name)[rows] for name in _NAMES))
 
-    def points(self, channel: str) -> ChannelPoints:
+    def points(self, channel: Channel) -> ChannelPoints:
         """Return it as what the comparison of a whole run looks at."""
         nothing = np.full(len(self.speed), np.nan)
         used = np.full(len(self.speed), Reason.USED, dtype=object)
@@ -55,7 +56,7 @@ class Trace:
             channel, self.stamp_ns, self.speed, self.amplitude, self.phase, self.predicted,
             self.low, self.high, nothing, nothing, used, complex(np.nan, np.nan))
 
-    def reference(self, channel: str) -> Reference:
+    def reference(self, channel: Channel) -> Reference:
         """Return its prediction."""
         nothing = np.full((len(self.speed), 1), np.nan)
         return Reference(self.stamp_ns, self.speed, (channel,), self.predicted[:, None],
@@ -71,7 +72,7 @@ class Passing:
 
     def __init__(self, machine: str, history: History, *, margin: float) -> None:
         self._machine, self._history, self._margin = machine, history, margin
-        self._traces: dict[str, Trace] = {}
+        self._traces: dict[Channel, Trace] = {}
         self._silent_ticks = 0
         self.faults: list[str] = []
 

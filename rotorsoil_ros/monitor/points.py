@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.channel import Channel, named
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.monitor.quasistatic import is_quasi_static, Resonance
 
@@ -73,7 +74,7 @@ class Reference:
         Of the reported speeds, ascending [ns].
     speed : (m,) float array
         [rad/s].
-    channels : tuple of str
+    channels : tuple of Channel
         What was predicted.
     displacement : (m, c) complex array
         NaN where there is no prediction [m, rad].
@@ -88,7 +89,7 @@ class Reference:
 
     stamp_ns: IntArray
     speed: FloatArray
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     displacement: ComplexArray
     low: FloatArray
     high: FloatArray
@@ -158,7 +159,7 @@ class ChannelPoints:
 
     """
 
-    channel: str
+    channel: Channel
     stamp_ns: IntArray
     speed: FloatArray
     amplitude: FloatArray
@@ -267,8 +268,8 @@ def _channel(
             (Reason.NO_SPEED, ~np.isfinite(speed)),
             (Reason.NOT_FINITE, ~np.isfinite(amplitude))):
         reason[holds] = why
-    return ChannelPoints(name, signal.stamp_ns, speed, amplitude, phase, predicted, low, high,
-                         behind, ahead, reason, runout)
+    return ChannelPoints(named(name, reference.channels), signal.stamp_ns, speed, amplitude,
+                         phase, predicted, low, high, behind, ahead, reason, runout)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Diagnostics, Event, Level, NANOSECONDS, Remark, Zoned
 from rotorsoil_ros.monitor.passing import Passing
 from rotorsoil_ros.monitor.zones import HousingState, LEVELS, MM, values, Vibration, worst
@@ -16,7 +17,7 @@ class Verdict:
         self._machine = machine
         self._vibration, self._passing = vibration, passing
         self._heard_ns: int | None = None
-        self._zones: dict[str, str] = {}
+        self._zones: dict[Channel, str] = {}
         self._is_stale = False
 
     def tell(

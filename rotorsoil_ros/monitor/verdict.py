@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.passage import PeakPair, told_once
@@ -22,7 +23,7 @@ from rotorsoil_ros.monitor.points import (
 )
 from rotorsoil_ros.monitor.quasistatic import Resonance
 from rotorsoil_ros.monitor.rules import Rules
-from rotorsoil_ros.monitor.zones import HOUSING, housing_zones, HousingZone
+from rotorsoil_ros.monitor.zones import housing_zones, HousingZone
 from rotorsoil_ros.units import rad_s_to_rpm
 
 
@@ -37,7 +38,7 @@ class Run:
         Its name in the log.
     stamp_ns, speed : (m,) arrays
         Reported speeds, ascending [ns], [rad/s].
-    channels : tuple of str
+    channels : tuple of Channel
         What a node predicted; empty if none did.
     displacement : (m, c) complex array
         Its answers [m, rad], NaN where there is none.
@@ -57,7 +58,7 @@ class Run:
     machine: str
     stamp_ns: IntArray
     speed: FloatArray
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     displacement: ComplexArray
     signals: Mapping[str, Signal]
     unbalances: Sequence[tuple[int, Mapping[str, complex]]]
@@ -169,7 +170,8 @@ def compare(run: Run, expectation: Expectation | None, rules: Rules) -> Comparis
         points = match(run.signals, reference, [*resonances, *seen], rules.matching)
     figures = [statistics(channel, margin=rules.amplitude_margin) for channel in points]
     zones = [] if expectation is None else [
-        found for channel in points if HOUSING in channel.channel
+        found for channel in points
+        if channel.channel.is_housing and channel.channel in reference.channels
         for found in housing_zones(channel, reference, expectation, limits=rules.zones,
                                    tolerance=rules.matching.tolerance)]
     comparison = Comparison(run, expectation, rules, reference, points, figures, peaks, zones,

@@ -17,14 +17,12 @@ from rotorsoil_ros.case.zone_limits import (
     zone,
     ZoneLimits,
 )
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Compared, Level, NANOSECONDS
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.points import ChannelPoints, nearest, Reference
 from rotorsoil_ros.monitor.quasistatic import speed_rate
 from rotorsoil_ros.monitor.rules import Rules
-
-# What is in the name of a channel of a housing.
-HOUSING = '_housing_'
 
 # Slower than this share of itself per second a speed counts as constant [1/s].
 STEADY = 0.005
@@ -34,7 +32,7 @@ STEADY = 0.005
 class HousingZone:
     """Worst zone of a housing: what, where [rad/s], how fast [m/s rms], by which limits."""
 
-    channel: str
+    channel: Channel
     source: str
     speed: float
     velocity: float
@@ -68,7 +66,7 @@ def housing_zones(
     index = nearest(channel.stamp_ns, reference.stamp_ns, tolerance=tolerance)
     rate = speed_rate(reference.time, reference.speed)[index]
     steady = np.isfinite(channel.speed) & (np.abs(rate) <= STEADY * np.abs(channel.speed))
-    natural = expectation.lowest_natural_speed(channel.channel[-1])
+    natural = expectation.lowest_natural_speed(channel.channel.axis)
     found = [_worst(channel, source, amplitude, steady, natural=natural, limits=limits)
              for source, amplitude in (('predicted', np.abs(channel.predicted)),
                                        ('measured', channel.amplitude))]
@@ -120,13 +118,13 @@ class Vibration:
 
     def __init__(self, rules: Rules) -> None:
         self._rules = rules
-        self.predicted: dict[str, HousingState] = {}
-        self.measured: dict[str, HousingState] = {}
-        self._inside: dict[str, deque[tuple[int, bool]]] = {}
-        self.outside: frozenset[str] = frozenset()
+        self.predicted: dict[Channel, HousingState] = {}
+        self.measured: dict[Channel, HousingState] = {}
+        self._inside: dict[Channel, deque[tuple[int, bool]]] = {}
+        self.outside: frozenset[Channel] = frozenset()
 
     def predict(
-        self, velocities: Mapping[str, float], speed: float, natural: Mapping[str, float],
+        self, velocities: Mapping[Channel, float], speed: float, natural: Mapping[str, float],
     ) -> None:
         """Zone predicted housing velocities [m/s rms] at a speed [rad/s]."""
         for channel, velocity in velocities.items():
@@ -137,7 +135,7 @@ class Vibration:
         velocity = np.abs(compared.speed)[:, None] * compared.amplitude / math.sqrt(2.0)
         for column, channel in enumerate(compared.channels):
             given = velocity[:, column][np.isfinite(velocity[:, column])]
-            if HOUSING in channel and len(given):
+            if channel.is_housing and len(given):
                 self._hold(self.measured, channel, float(np.median(given)),
                            float(compared.speed[-1]), natural)
 
@@ -153,7 +151,7 @@ class Vibration:
             points.extend(zip(compared.stamp_ns[rows].tolist(), inside[rows, column].tolist(),
                               strict=True))
 
-    def settle(self) -> Iterator[tuple[str, bool]]:
+    def settle(self) -> Iterator[tuple[Channel, bool]]:
         """Decide which channels lie outside the band; yield those that changed."""
         outside = set(self.outside)
         for channel, points in self._inside.items():
@@ -169,7 +167,7 @@ class Vibration:
             yield channel, channel in outside
         self.outside = frozenset(outside)
 
-    def share_inside(self, channel: str) -> float:
+    def share_inside(self, channel: Channel) -> float:
         """Return the share of recent points inside the band, NaN of too few."""
         points = self._inside.get(channel, ())
         if len(points) < FEWEST:
@@ -177,18 +175,18 @@ class Vibration:
         return sum(inside for _, inside in points) / len(points)
 
     @property
-    def channels(self) -> tuple[str, ...]:
+    def channels(self) -> tuple[Channel, ...]:
         """Channels of which points were compared."""
         return tuple(self._inside)
 
     def _hold(
-        self, states: dict[str, HousingState], channel: str, velocity: float, speed: float,
+        self, states: dict[Channel, HousingState], channel: Channel, velocity: float, speed: float,
         natural: Mapping[str, float],
     ) -> None:
         state = states.setdefault(channel, HousingState())
         state.velocity = velocity
         support = held_support_class(
-            state.support, natural[channel[-1]], speed, hysteresis=HYSTERESIS)
+            state.support, natural[channel.axis], speed, hysteresis=HYSTERESIS)
         # Other limits make another question: nothing is held over from the last one.
         before = state.zone if support == state.support else None
         state.support = support
@@ -196,7 +194,7 @@ class Vibration:
                                hysteresis=HYSTERESIS)
 
 
-def worst(states: Mapping[str, HousingState]) -> tuple[str, HousingState] | None:
+def worst(states: Mapping[Channel, HousingState]) -> tuple[Channel, HousingState] | None:
     """Return the channel that is worst, by its zone and then by its velocity."""
     known = [entry for entry in states.items() if entry[1].zone is not None]
     return max(known, key=lambda entry: (entry[1].zone or '', entry[1].velocity), default=None)

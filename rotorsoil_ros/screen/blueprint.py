@@ -49,9 +49,9 @@ class Shown:
     @property
     def housings(self) -> list[Trend]:
         """The channels that have zones: of housings that can move."""
-        moving = {f'{name}_housing_{axis}' for name in moving_housings(self.case)
-                  for axis in DIRECTIONS}
-        return [trend for trend in self.trends if trend.channel in moving]
+        moving = moving_housings(self.case)
+        return [trend for trend in self.trends
+                if trend.channel.is_housing and trend.channel.station in moving]
 
     def kinds(self, order: Sequence[str] = ORDER) -> list[str]:
         """Return the kinds of channels that there are, in the order of their tabs."""
@@ -90,7 +90,7 @@ def _trend_column(shown: Shown) -> rrb.Vertical:
 
 def _velocity(shown: Shown, axis: str) -> rrb.View:
     contents = [f'{trend.entity}/velocity/**' for trend in shown.housings
-                if trend.channel.endswith(axis)]
+                if trend.channel.axis == axis]
     return _series(f'Housings {DIRECTIONS[axis]}, velocity [mm/s rms]',
                    [*contents, f'{shown.entity("limits", axis)}/**'])
 

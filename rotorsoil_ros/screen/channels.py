@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import rerun as rr
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import Channel
 
 MICRO = 1e6  # [um, urad] per [m, rad]
 PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING = (
@@ -18,7 +19,7 @@ COLOURS = ((78, 154, 230), (255, 159, 54), (80, 190, 90), (235, 90, 90), (178, 1
 class Trend:
     """One channel on the screen: its kind, its entity (split at the station), its colour."""
 
-    channel: str
+    channel: Channel
     kind: str
     entity: str
     colour: tuple[int, int, int]
@@ -42,7 +43,7 @@ def moving_housings(case: Case) -> list[str]:
             if bearing.foundation in blocks or bearing.pedestal is not None]
 
 
-def trends(machine: str, case: Case, channels: Sequence[str]) -> list[Trend]:
+def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]:
     """Return how the channels of a case are shown."""
     owners = {bearing.name: JOURNALS for bearing in case.rotor.bearings}
     owners |= {disc.name: DISCS for disc in case.rotor.discs}
@@ -50,16 +51,14 @@ def trends(machine: str, case: Case, channels: Sequence[str]) -> list[Trend]:
     owners |= {foundation.name: BLOCK for foundation in case.foundations}
     shown: list[Trend] = []
     for channel in channels:
-        owner = max((name for name in owners if channel.startswith(f'{name}_')), key=len)
-        motion = channel.removeprefix(f'{owner}_')
-        kind = _kind(motion, owners[owner])
+        kind = _kind(channel, owners[channel.station])
         colour = COLOURS[sum(trend.kind == kind for trend in shown) % len(COLOURS)]
-        entity = rr.new_entity_path([machine, owner, motion])
+        entity = rr.new_entity_path([machine, channel.station, channel.motion])
         shown.append(Trend(channel, kind, entity, colour))
     return shown
 
 
-def _kind(motion: str, kind_of_owner: str) -> str:
-    if motion.startswith('housing'):
+def _kind(channel: Channel, kind_of_owner: str) -> str:
+    if channel.is_housing:
         return HOUSINGS
-    return ROCKING if kind_of_owner == BLOCK and motion.startswith('r') else kind_of_owner
+    return ROCKING if channel.is_rotation else kind_of_owner

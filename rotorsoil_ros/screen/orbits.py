@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import across, HOUSING, JOURNAL
 from rotorsoil_ros.events import Compared, NANOSECONDS
 from rotorsoil_ros.monitor.points import nearest
 from rotorsoil_ros.screen.bode import MEASURED, PREDICTED
@@ -225,18 +226,17 @@ class Track:
 def cells(case: Case, channels: Sequence[str]) -> list[Cell]:
     """Return the circles of a machine, along its shaft; housings that stand on soil below."""
     rotor = case.rotor
-    on_shaft = [(bearing.position, f'{bearing.name}_journal') for bearing in rotor.bearings]
-    on_shaft += [(disc.position, disc.name) for disc in rotor.discs]
-    on_shaft += [(probe.position, probe.name) for probe in rotor.probes]
+    on_shaft = [(bearing.position, across(bearing.name, JOURNAL)) for bearing in rotor.bearings]
+    on_shaft += [(disc.position, across(disc.name)) for disc in rotor.discs]
+    on_shaft += [(probe.position, across(probe.name)) for probe in rotor.probes]
     moving = moving_housings(case)
-    housings = [(bearing.position, f'{bearing.name}_housing') for bearing in rotor.bearings
+    housings = [(bearing.position, across(bearing.name, HOUSING)) for bearing in rotor.bearings
                 if bearing.name in moving]
     found = []
     for row, stations in enumerate((sorted(on_shaft), sorted(housings))):
-        for column, (_, station) in enumerate(stations):
-            names = f'{station}_x', f'{station}_z'
-            if all(name in channels for name in names):
-                found.append(Cell(station, (channels.index(names[0]), channels.index(names[1])),
+        for column, (_, (x, z)) in enumerate(stations):
+            if x in channels and z in channels:
+                found.append(Cell(x.place, (channels.index(x), channels.index(z)),
                                   np.array([column * PITCH, row * ROW])))
     return found
 

@@ -102,7 +102,7 @@ class Picture:
         # Beside the machine and not on it: names of neighbours would cover each other.
         log('names', rr.Points3D(
             [scene.name_place(station) for station in scene.stations], colors=GOLD, radii=0.0,
-            labels=[station.name.removesuffix('_journal') for station in scene.stations],
+            labels=[station.name for station in scene.stations],
             show_labels=True))
         axis = scene.points(scene.y[[0, -1]], np.zeros((2, 2)))
         log('shaft_at_rest', rr.LineStrips3D([axis], colors=(*STEEL, 90), radii=EDGE_RADIUS))

@@ -9,7 +9,8 @@ from scipy.interpolate import CubicSpline
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.ground.soil import DOFS, Rectangle
+from rotorsoil_ros.channel import across, Channel, DOFS, JOURNAL
+from rotorsoil_ros.ground.soil import Rectangle
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.assembly import Disc
 
@@ -28,7 +29,7 @@ class Station:
     Attributes
     ----------
     name : str
-        Of the journal, disc or probe.
+        Of the bearing, disc or probe.
     y, radius : float
         Position along the shaft, and of the disc that sits there or zero [m].
     x_channel, z_channel : int
@@ -72,12 +73,13 @@ class Scene:
     def __init__(self, case: Case, channels: Sequence[str]) -> None:
         index = {name: number for number, name in enumerate(channels)}
         rotor = case.rotor
-        places = [(f'{bearing.name}_journal', bearing.position, 0.0) for bearing in rotor.bearings]
-        places += [(disc.name, disc.position, disc_radius(disc)) for disc in rotor.discs]
-        places += [(probe.name, probe.position, 0.0) for probe in rotor.probes]
+        places = [(across(bearing.name, JOURNAL), bearing.position, 0.0)
+                  for bearing in rotor.bearings]
+        places += [(across(disc.name), disc.position, disc_radius(disc)) for disc in rotor.discs]
+        places += [(across(probe.name), probe.position, 0.0) for probe in rotor.probes]
         self.stations = sorted(
-            (Station(name, y, radius, index[f'{name}_x'], index[f'{name}_z'])
-             for name, y, radius in places), key=lambda station: station.y)
+            (Station(x.station, y, radius, index[x], index[z]) for (x, z), y, radius in places),
+            key=lambda station: station.y)
         self.shaft_height = rotor.shaft_height
         self.length = sum(section.length for section in rotor.shaft)
         blocks = {foundation.name for foundation in case.foundations}
@@ -176,7 +178,7 @@ def _block(foundation: Foundation, case: Case, index: Mapping[str, int]) -> Bloc
                      else (contact.radius, contact.radius))
     seats = tuple(bearing.position for bearing in case.rotor.bearings
                   if bearing.foundation == foundation.name)
-    channels = tuple(index[f'{foundation.name}_{dof}'] for dof in DOFS)
+    channels = tuple(index[Channel(foundation.name, '', dof)] for dof in DOFS)
     height = foundation.height or BLOCK_SHARE * case.rotor.shaft_height
     return Block(foundation.name, width, length, height,
                  foundation.centre_y, seats, channels, foundation.height is None)

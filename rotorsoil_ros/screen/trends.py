@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.zone_limits import support_class, ZoneLimits
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Band, Compared, NANOSECONDS, Zoned
 from rotorsoil_ros.screen.channels import HOUSINGS, MICRO, Trend
 from rotorsoil_ros.screen.recording import Recording, TREND_NS
@@ -135,7 +136,7 @@ class ZoneLane:
     def __init__(self, recording: Recording, entity: str) -> None:
         self._recording = recording
         self._entity = entity
-        self._told: dict[tuple[str, str], str] = {}
+        self._told: dict[tuple[Channel, str], str] = {}
 
     @staticmethod
     def views(entity: str, label: str) -> rrb.Horizontal:
@@ -153,7 +154,7 @@ class ZoneLane:
             for source, zones in ((PREDICTED, event.predicted), (MEASURED, event.measured)):
                 self._tell(channel, source, zones.get(channel) or UNKNOWN, stamp_ns)
 
-    def _tell(self, channel: str, source: str, zone: str, stamp_ns: int) -> None:
+    def _tell(self, channel: Channel, source: str, zone: str, stamp_ns: int) -> None:
         before = self._told.get((channel, source))
         if zone == before:
             return

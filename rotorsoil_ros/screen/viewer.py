@@ -10,6 +10,7 @@ import rerun as rr
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import (
     Band,
     Compared,
@@ -230,7 +231,7 @@ def _clock(stamp_ns: int) -> str:
 
 def _joined(events: Iterable[Compared]) -> Iterable[Compared]:
     """Join what was measured of the same channels: one column is cheaper than many rows."""
-    by_channels: dict[tuple[str, ...], list[Compared]] = {}
+    by_channels: dict[tuple[Channel, ...], list[Compared]] = {}
     for event in events:
         by_channels.setdefault(event.channels, []).append(event)
     for channels, found in by_channels.items():

@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import LAST_STAMP, Measured, Samples
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.wire.cdr import (
@@ -28,8 +29,7 @@ TOPICS = SPEED_TOPICS | MEASURED_TOPICS
 ROTOR_JOINT = 'rotor'
 UNREAD = ('malformed', 'joint_missing')  # of no use, not even for the log
 
-# A sensor on a housing or a block has an axis; what turns cannot be measured so.
-RAW_NAME = re.compile(r'measured/(\w+_[xyz])/imu')
+RAW_NAME = re.compile(r'measured/(\w+)/imu')
 
 Note: TypeAlias = Callable[[str, int], None]
 Outlet: TypeAlias = Callable[[Records], None]
@@ -185,12 +185,12 @@ class MeasuredInlet:
 class SampleInlet:
     """Tells the monitor raw samples of one channel, and logs them as they came."""
 
-    def __init__(self, topic: str, channel: str, monitor: Monitor, *, log: Outlet) -> None:
+    def __init__(self, topic: str, channel: Channel, monitor: Monitor, *, log: Outlet) -> None:
         self._topic, self._channel = topic, channel
         self._monitor = monitor
         self._log = log
         self._reader = ImuReader()
-        self._axis = AXES.index(channel[-1])
+        self._axis = AXES.index(channel.axis)
 
     def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
         """Take in messages; their own stamps count, not when they were received."""
@@ -209,10 +209,12 @@ def are_stamps(stamp_ns: IntArray) -> bool:
     return bool(stamp_ns.min() >= 0 and stamp_ns.max() <= LAST_STAMP)
 
 
-def raw_channel(name: str) -> str:
-    """Return the channel of a name such as `measured/<channel>/imu`; empty of other names."""
+def raw_channel(name: str) -> Channel | None:
+    """Return the channel of a name such as `measured/<channel>/imu`; None of other names."""
     found = RAW_NAME.fullmatch(name)
-    return found[1] if found else ''
+    channel = Channel.parse(found[1]) if found else None
+    # A sensor feels along an axis: a rotation cannot be measured so.
+    return channel if channel and channel.axis in AXES else None
 
 
 def inlet(name: str, topic: str, monitor: Monitor, *, rotor_joint: str, log: Outlet) -> Inlet:

@@ -9,10 +9,10 @@ import pytest
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model, response_key
 from rotorsoil_ros.case.stiffness_file import read
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.soil import DOFS
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
 ANY = (1.0, 2.0)

@@ -10,6 +10,7 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.figures.modal import modal_figures
@@ -89,7 +90,8 @@ def test_still_directions_of_a_rigid_base_are_not_drawn(tmp_path):
 def test_trend_shows_what_an_instrument_could_see():
     speed = rpm_to_rad_s(np.array([600.0, 1200.0]))
     figure = trend(np.array([0.0, 1.0]), speed, np.array([[1e-6, 2e-6, 3e-6], [4e-6, 5e-6, 6e-6]]),
-                   channels=('a_housing_x', 'a_journal_x', 'block_rx'), title='t')
+                   channels=tuple(map(Channel.parse, ('a_housing_x', 'a_journal_x', 'block_rx'))),
+                   title='t')
     top, bottom = figure.axes
     np.testing.assert_allclose(top.get_lines()[0].get_ydata(), [600.0, 1200.0])
     [line] = bottom.get_lines()
