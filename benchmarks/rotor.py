@@ -29,7 +29,7 @@ LENGTH, DIAMETER = 0.76202, 0.020021
 SPEED_RANGE = (2.0 * math.pi, 300.0 * math.pi)
 UNBALANCE = np.array([1e-5, 0.0])
 
-# What ROSS 3.0 took for the same rotor, by the design note: processor seconds.
+# What ROSS 3.0 took for the same rotor once: processor seconds.
 ROSS_RESPONSE, ROSS_CAMPBELL = 2.3, 2.5
 
 
@@ -76,7 +76,7 @@ def main() -> None:
         print(f'  {count:5d} speeds: {1e3 * warm:8.2f} ms ({1e3 * cold:.2f} ms from the case on), '
               f'dense {1e3 * slow:8.0f} ms: {slow / warm:.0f} times')
         if count == 300:
-            print(f'               ROSS 3.0 by the note {1e3 * ROSS_RESPONSE:.0f} ms: '
+            print(f'               ROSS 3.0 once {1e3 * ROSS_RESPONSE:.0f} ms: '
                   f'{ROSS_RESPONSE / warm:.0f} times ({ROSS_RESPONSE / cold:.0f} times from the '
                   'case on)')
     table = seconds(lambda: ResponseTable.build(machine(28), SPEED_RANGE), 3)
@@ -84,7 +84,7 @@ def main() -> None:
 
     speed = np.linspace(0.0, SPEED_RANGE[1], 50)
     modes = seconds(lambda: campbell(machine(28), speed, 6), 7)
-    print(f'campbell, 50 speeds, 6 modes: {1e3 * modes:.0f} ms; ROSS 3.0 by the note '
+    print(f'campbell, 50 speeds, 6 modes: {1e3 * modes:.0f} ms; ROSS 3.0 once '
           f'{1e3 * ROSS_CAMPBELL:.0f} ms: {ROSS_CAMPBELL / modes:.0f} times')
     criticals = seconds(lambda: critical_speeds(machine(28), SPEED_RANGE), 3)
     print(f'critical speeds 60 to 9000 rpm: {1e3 * criticals:.0f} ms')

@@ -1,7 +1,6 @@
 """The seed paper's machine, and pieces of it, for the tests."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection
 from rotorsoil_ros.rotor.bearing import Pedestal, SpeedTable
 
-REFERENCE = Path(__file__).resolve().parent / 'reference'
 STEEL = Material(2.09e11, 0.3, 7920.0)
 # From I = 7887 mm^4 and 1.9 kg of shaft: the rounded figures of the paper move peaks by 1 %.
 DIAMETER = (64.0 * 7887e-12 / math.pi) ** 0.25
@@ -111,3 +109,26 @@ def springy_soils():
     stiffness[0, 4] = stiffness[4, 0] = 2e7
     damping = np.diag([4e5, 4e5, 9e5, 3e4, 5e4, 4e4])
     return Springs(stiffness, damping), Springs(1.3 * stiffness, 0.7 * damping)
+
+
+def two_blocks(cross=0.0):
+    """Return a machine whose bearings stand on two blocks, one of them by two bearings."""
+    stiffness = np.array([[2e8, cross], [-cross, 1e8]])
+    damping = np.array([[4e4, 1e3], [-1e3, 2e4]])
+    section = ShaftSection(2.0, (0.08, 0.10), (0.0, 0.02), 10, STEEL)
+    rotor = Rotor(
+        0.9, (section,),
+        (Disc('wheel', 0.8, 60.0, 1.5, 2.9), Disc('coupling', 2.0, 12.0, 0.1, 0.2)),
+        (bearing('one', 0.1, stiffness=stiffness, damping=damping, foundation='left'),
+         bearing('two', 1.4, stiffness=stiffness, damping=damping, foundation='right'),
+         bearing('three', 1.9, stiffness=3e8, damping=1e4, foundation='right')),
+        (Probe('probe', 0.55),))
+    blocks = (Foundation('left', Rectangle(0.5, 0.4), 0.1, 900.0, 0.3, (60.0, 70.0, 80.0)),
+              Foundation('right', Rectangle(0.5, 0.6), 1.6, 1500.0, 0.35, (90.0, 95.0, 120.0)))
+    soils = tuple(ConeModel(SOIL, block.contact) for block in blocks)
+    return CoupledModel(rotor, blocks, soils)
+
+
+def channel(model, prediction, name):
+    """Return the displacement of one channel."""
+    return prediction.displacement[:, model.channels.index(name)]

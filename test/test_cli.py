@@ -106,7 +106,7 @@ def test_check_prints_what_follows_from_the_case(capsys, tmp_path):
     lines = dict(line.split('  ', 1) for line in capsys.readouterr().out.splitlines()
                  if '  ' in line)
     lines = {name: value.strip() for name, value in lines.items()}
-    assert lines['shear wave speed c_s'] == '158.94 m/s'  # design note, theory/rotor.md
+    assert lines['shear wave speed c_s'] == '158.94 m/s'  # sqrt(48e6 / 1900)
     assert lines['dilatational wave speed c_p'] == '275.3 m/s'
     assert lines['block: static stiffness z'] == '1.444e+08 N/m'
     assert lines['block: static stiffness x'] == '1.238e+08 N/m'

@@ -36,8 +36,6 @@ SECOND = 1_000_000_000
 HOUSINGS = tuple(f'{end}_housing_{axis}' for end in ('drive_end', 'fan_end') for axis in 'xz')
 RUN_UP = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
 
-needs_run_up = pytest.mark.skipif(not RUN_UP.exists(), reason='measured run-up is not here')
-
 
 @pytest.fixture(scope='module')
 def kit_log(tmp_path_factory):
@@ -271,7 +269,6 @@ def test_demonstration_without_a_plant_finds_what_was_put_in(tmp_path, capsys):
     assert 'SYNTHETIC' in (out / 'report.html').read_text().split('</h1>')[0]
 
 
-@needs_run_up
 def test_rotor_kit_is_shown_as_it_is(kit_log, tmp_path, capsys):
     assert main(['compare', kit_log, KIT, '-o', str(tmp_path)]) == 1
     said = capsys.readouterr().out
@@ -289,7 +286,6 @@ def test_rotor_kit_is_shown_as_it_is(kit_log, tmp_path, capsys):
     assert not peak['quasi_static']
 
 
-@needs_run_up
 def test_rotor_kit_bearing_stiffness_is_identified(kit_log, tmp_path, capsys):
     arguments = ['compare', kit_log, KIT, '-o', str(tmp_path), '--plane', 'disc_1',
                  '--identify', 'rotor.bearings.*.stiffness']
@@ -308,7 +304,6 @@ def test_rotor_kit_bearing_stiffness_is_identified(kit_log, tmp_path, capsys):
     assert 'refused: the run cannot tell rotor.bearings.*.stiffness' in capsys.readouterr().out
 
 
-@needs_run_up
 def test_log_of_an_answered_run_knows_its_case(kit_log, tmp_path, capsys):
     answered = str(tmp_path / 'answered.mcap')
     assert main(['predict', KIT, kit_log, '-o', answered]) == 0
@@ -327,7 +322,6 @@ def test_log_of_an_answered_run_knows_its_case(kit_log, tmp_path, capsys):
                for line in summary(changed)['remarks'])
 
 
-@needs_run_up
 def test_without_a_case_it_does_what_can_be_done(kit_log, tmp_path, capsys):
     answered = tmp_path / 'answered.mcap'
     case = tmp_path / 'my_kit.yaml'

@@ -116,7 +116,7 @@ def test_criticals_of_the_range_of_the_case_are_those_of_the_model(capsys, model
 
 
 def test_criticals_of_the_rigid_machine_are_those_of_the_design_note(capsys):
-    # theory/rotor.md, the paper's machine: backward and forward
+    # the paper's machine on rigid ground: backward and forward
     _, rows = table_of(capsys, 'campbell', PAPER, '--criticals', '--rpm', '60:9000:2',
                        '--set', 'support.model=rigid')
     np.testing.assert_allclose(rows[:, 0], hz_to_rad_s(np.array([44.01, 48.86, 123.12, 129.48])),

@@ -1,4 +1,4 @@
-"""The page docs/verification.md says what its command computes, and all of it holds."""
+"""The pages of accuracy say what their commands compute, and no command writes without data."""
 
 import importlib.util
 from pathlib import Path
@@ -6,42 +6,40 @@ import re
 
 import pytest
 
+from oracles.published import cases, REFERENCE
+
 DOCS = Path(__file__).parents[1] / 'docs'
+PAGE = (DOCS / 'verification.md').read_text()
 
 
-@pytest.fixture(scope='module')
-def study():
-    """Return the command that writes the page, as a module."""
-    spec = importlib.util.spec_from_file_location('verification', DOCS / 'verification.py')
+def command(name):
+    """Return a command that writes a page, as a module."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f'{name}.py')
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def test_every_benchmark_of_the_shared_file_is_on_the_page(study):
-    names = set(study._cases())
-    if not names:
-        pytest.skip('reference data not beside the checkout: benchmarks.json')
-    page = (DOCS / 'verification.md').read_text()
+@pytest.fixture(scope='module')
+def study():
+    return command('verification')
+
+
+def test_every_benchmark_of_the_reference_is_on_the_page(study):
+    names = set(cases())
     assert names == set(study.RECIPES)
-    assert names <= set(re.findall(r'^### (\S+)$', page, flags=re.MULTILINE))
+    assert names <= set(re.findall(r'^### (\S+)$', PAGE, flags=re.MULTILINE))
 
 
-def test_every_response_that_ross_computed_is_on_the_page(study):
-    files = sorted(path.name for path in study.REFERENCE.glob('ross_*.csv'))
-    if not files:
-        pytest.skip('reference data not beside the checkout: ross_*.csv')
-    page = (DOCS / 'verification.md').read_text()
-    rows = dict(re.findall(r'^\| (ross_\S+\.csv) \| \d+ \| \S+ \| (.*) \|$', page,
+def test_every_response_that_ross_computed_is_on_the_page():
+    rows = dict(re.findall(r'^\| (ross_\S+\.csv) \| \d+ \| \S+ \| (.*) \|$', PAGE,
                            flags=re.MULTILINE))
-    assert sorted(rows) == files
+    assert set(rows) == {path.name for path in (REFERENCE / 'rotor').glob('ross_*.csv')}
     assert set(rows.values()) == {'1e-06 | holds'}
 
 
-def test_page_shows_no_failure_and_nothing_absent():
-    page = (DOCS / 'verification.md').read_text()
-    assert 'FAILS' not in page
-    assert 'not computed' not in page
+def test_page_shows_no_failure():
+    assert 'FAILS' not in PAGE
 
 
 def test_failure_would_be_shown(study):
@@ -49,16 +47,20 @@ def test_failure_would_be_shown(study):
     assert any('**FAILS**' in line for line in study._section(one))
 
 
-def test_absent_reference_is_said(study, monkeypatch, tmp_path):
-    monkeypatch.setattr(study, 'REFERENCE', tmp_path)
-    page = study.page()
-    assert 'not computed: `benchmarks.json`' in page
-    assert 'ROSS_hollow_criticals' in page
+@pytest.mark.parametrize('name, page', [
+    ('verification', 'PAGE'), ('convergence_study', 'PAGE_FILE')])
+def test_no_page_is_written_without_the_data_it_is_about(name, page, monkeypatch, tmp_path):
+    module = command(name)
+    owner = module.published if name == 'verification' else module
+    monkeypatch.setattr(owner, 'REFERENCE', tmp_path)
+    monkeypatch.setattr(module, page, tmp_path / 'page.md')
+    with pytest.raises(SystemExit, match=r'not there, so page\.md is not written'):
+        module.main()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_figures_of_the_page_are_those_computed_now(study):
-    page = (DOCS / 'verification.md').read_text()
-    for finding in [*study.note(), *study.imports()]:
+    for finding in [*study.criticals(), *study.imports()]:
         for value in finding.expected:
-            assert f'| {value:.10g} | ' in page
+            assert f'| {value:.10g} | ' in PAGE
         assert finding.deviation.max() <= finding.tolerance

@@ -11,8 +11,8 @@ from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilMod
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import rad_s_to_rpm
 
-# What the design note measured of cones against rigorous solutions (soil_and_foundation.md, 1.2
-# and 1.3): beyond these they are off by more than a quarter.
+# Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
+# quarter.
 _SMALLEST_A0 = 1.5
 _LARGEST_A0 = 6.0
 _LARGEST_A0_INCOMPRESSIBLE = 2.0

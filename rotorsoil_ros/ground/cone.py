@@ -98,7 +98,7 @@ class ConeModel:
     Notes
     -----
     Within 25 % of the rigorous stiffness; below a0 = 1.5 it radiates too much, above all in
-    rocking (design note, sec. 1.2). Static stiffness is that of the smooth disc, exactly.
+    rocking (theory manual, cones). Static stiffness is that of the smooth disc, exactly.
 
     """
 

@@ -105,7 +105,7 @@ def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
 
     References
     ----------
-    Design note `soil_and_foundation`, sec. 3; API 684 for the use of the diagram.
+    Theory manual, modes; API 684 for the use of the diagram.
 
     """
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))

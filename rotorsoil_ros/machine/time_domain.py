@@ -74,7 +74,7 @@ def shake(
     Notes
     -----
     Soil acts as spring and dashpot with the compliance at the momentary speed: exact for what
-    turns with the rotor, a good stand-in for free vibration near it (design note, 5.1).
+    turns with the rotor, a good stand-in for free vibration near it (theory manual, passage).
     Newmark's error is (omega dt)^2 / 12 of a frequency.
 
     """

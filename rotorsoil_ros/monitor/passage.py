@@ -67,7 +67,7 @@ class Passage:
 
         Notes
         -----
-        A fast passage peaks late, by up to 2.16 sqrt(rate) (Lewis 1932, design note 5.1).
+        A fast passage peaks late, by up to 2.16 sqrt(rate) (Lewis 1932).
 
         """
         if self.number(damping_ratio) >= SLOW_ENOUGH:

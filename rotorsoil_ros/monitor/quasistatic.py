@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from rotorsoil_ros.arrays import BoolArray, FloatArray
 
-# From p = 1.5 on the peak of a passage is within 4 % of the steady one (design note, sec. 5.1).
+# From p = 1.5 on the peak of a passage is within 4 % of the steady one (theory manual).
 SLOW_ENOUGH = 1.5
 
 # Before the resonance, in units of the square root of the rate: nearer, the response lags.

@@ -12,12 +12,10 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader, NonSeekingReader
 from mcap.records import Chunk, DataEnd, MessageIndex
 from mcap.stream_reader import get_chunk_data_stream, StreamReader
-import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer as ForeignWriter
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
-from rosbags.typesys import get_typestore, Stores
 import yaml
 
 from rotorsoil_ros.bags import reader as bag_reader
@@ -27,47 +25,21 @@ from rotorsoil_ros.wire.messages import (
     DIAGNOSTICS,
     FLOAT64,
     JOINT_STATE,
-    JointStateWriter,
-    Records,
     STRING,
 )
 from rotorsoil_ros.wire.topics import definition, type_hash
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from records import (
+    float_records,
+    joint_records,
+    read_all,
+    START,
+    STORE,
+    string_records,
+    written,
+)
+
 TYPES = (JOINT_STATE, STRING, DIAGNOSTICS, FLOAT64)
-START = 1_700_000_000_000_000_001
-
-
-def joint_records(count, *, topic='/fan/joint_states', start=START):
-    stamps = [start + 10**6 * row for row in range(count)]
-    values = np.random.default_rng(count).normal(size=(count, 3, 1))
-    return Records(topic, JOINT_STATE, stamps, JointStateWriter(['rotor']).write(stamps, values))
-
-
-def float_records(count, *, topic='/fan/rotor/speed', start=START):
-    stamps = [start + 10**6 * row for row in range(count)]
-    return Records(topic, FLOAT64, stamps, [
-        b'\0\1\0\0' + struct.pack('<d', row) for row in range(count)])
-
-
-def string_records(*, start=START):
-    payload = STORE.serialize_cdr(STORE.types[STRING]('{}'), STRING)
-    return Records('/rotorsoil/fan/model', STRING, [start], [bytes(payload)], latched=True)
-
-
-@pytest.fixture
-def bag(tmp_path):
-    return BagWriter(new_directory(tmp_path, 'run'))
-
-
-def read_all(path):
-    return [(source.topic, time, payload)
-            for source, time, payload in bag_reader.messages(path, lambda *_: True)]
-
-
-def written(*batches):
-    return sorted((time, records.topic, payload) for records in batches
-                  for time, payload in zip(records.log_time_ns, records.payloads, strict=True))
 
 
 def test_rosbags_reads_message_for_message_what_was_written(bag):

@@ -157,11 +157,9 @@ def test_a_table_that_is_not_a_run_up_is_refused(tmp_path, table):
 
 def test_the_measured_run_up_ramps_at_228_rpm_per_second(tmp_path):
     source = REFERENCE / 'measured' / 'rk4_runup_1x.csv'
-    if not source.exists():
-        pytest.skip('shared data not beside the checkout')
     out = tmp_path / 'rk4.mcap'
     import_run_up(source, out, machine='kit', channel='probe_1_x', start_ns=START)
     stamps, speeds = read(out)
     assert len(stamps) == 210
     ramp = (speeds[-1] - speeds[0]) / ((stamps[-1] - stamps[0]) * 1e-9)
-    assert ramp == pytest.approx(rpm_to_rad_s(228.0), rel=0.05)  # as logging_and_viewing.md says
+    assert ramp == pytest.approx(rpm_to_rad_s(228.0), rel=0.05)

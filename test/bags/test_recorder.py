@@ -14,7 +14,7 @@ from rotorsoil_ros.bags.recorder import Recorder
 from rotorsoil_ros.bags.writer import new_directory
 from rotorsoil_ros.events import Level
 
-from test_bag import joint_records, read_all, START, string_records
+from records import joint_records, read_all, START, string_records
 
 SECOND = 10**9
 

@@ -13,7 +13,7 @@ from rotorsoil_ros.bags.recorder import BagAside, BATCH, Recorder
 from rotorsoil_ros.bags.writer import new_directory
 from rotorsoil_ros.events import Level
 
-from test_bag import joint_records, read_all, START, string_records
+from records import joint_records, read_all, START, string_records
 
 DEADLINE_S = 10.0
 BACKLOG = 32

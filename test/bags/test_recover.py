@@ -13,9 +13,7 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
 
-from test_bag import bag, float_records, joint_records, read_all, START, string_records
-
-__all__ = ['bag']
+from records import float_records, joint_records, read_all, START, string_records
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.retention import is_unfinished, make_room, Recovery, unfinished
 from rotorsoil_ros.bags.writer import BagWriter, LogFile, new_directory
 
-from test_bag import joint_records, read_all, START, string_records
+from records import joint_records, read_all, START, string_records
 
 KIB = 1024
 

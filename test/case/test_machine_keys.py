@@ -75,7 +75,7 @@ def test_disc_by_its_dimensions_is_a_hollow_cylinder():
 def test_grade_is_the_moment_that_it_permits_the_whole_rotor():
     case = load(PAPER, ['unbalances=[{disc: disc_2, grade: G6.3, rated_speed_rpm: 3000, '
                         'phase: 0.5}]'])
-    # ISO 21940-11: e Omega = 6.3 mm/s; 4.2 kg of rotor by the design note, to its digits
+    # ISO 21940-11: e Omega = 6.3 mm/s; 4.2 kg of rotor (seed paper, table 1), to its digits
     expected = 6.3e-3 * 4.2 / (100.0 * math.pi)
     assert abs(case.unbalance[1]) == pytest.approx(expected, rel=1e-3)
     assert np.angle(case.unbalance[1]) == pytest.approx(0.5)

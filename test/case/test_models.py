@@ -77,7 +77,7 @@ def test_infinite_elements_are_solved_once_for_all_stiffnesses(cache, monkeypatc
 
 
 def test_cone_and_infinite_elements_answer_alike(cache):
-    # Within what cones are off by (design note, sec. 1.2): 25 % of stiffness.
+    # Within what cones are off by (theory manual, cones): 25 % of stiffness.
     case = load(PAPER)
     omega = np.array([50.0, 300.0])
     cone, elements = (coupled_model(load(PAPER, settings), cache).soil_models[0].compliance(omega)

@@ -1,4 +1,4 @@
-"""config/rk4_rotor_kit.yaml against the design note's description of the rig."""
+"""config/rk4_rotor_kit.yaml against the description of the rig that its run-up came with."""
 
 from pathlib import Path
 

@@ -20,45 +20,9 @@ from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.modes import campbell, critical_speeds
 
-FILES = Path(__file__).parents[1] / 'reference' / 'ross'
+from oracles.published import ross_criticals, ross_figures, ROSS_FILES, ross_response
+
 NO_CACHE = Path('no cache is needed on a rigid support')
-HOLLOW_AT_500 = [
-    -5.363399632192386 + 508.7018526938813j, -5.316344662377608 + 567.065846695789j,
-    -25.968084743509294 + 768.6000082702395j, -15.568166597805533 + 817.1367836091372j]
-HOLLOW_CRITICALS = [508.16531382445356, 571.0711473752397, 766.1588525836868, 826.3348492685868]
-SPEEDS = np.array([100.0, 400.0, 700.0, 1000.0])
-# horizontal and vertical of ROSS at its nodes 3 (wheel) and 9 (overhung fan)
-HOLLOW_RESPONSE = {
-    'wheel': [
-        (9.171597433835885e-08 + 8.72533984542036e-10j,
-         1.004583813617235e-09 - 8.37095069541607e-08j),
-        (2.438720070094516e-06 - 1.519500415378516e-07j,
-         -5.681993218468303e-08 - 2.169054622538942e-06j),
-        (3.2267051870574104e-06 - 1.2782106066524606e-06j,
-         3.4323813157018816e-07 + 5.400981804841605e-07j),
-        (-8.219632866056615e-06 - 6.745975689822327e-07j,
-         -6.855264300438222e-07 + 9.653283230682006e-06j)],
-    'overhung_fan': [
-        (-5.2308166614693664e-08 - 4.134121417465557e-10j,
-         -4.389307387363595e-10 + 5.278077454045083e-08j),
-        (-2.143870619531886e-06 + 1.1219763322720369e-07j,
-         2.9249768424582643e-08 + 2.0016145585612674e-06j),
-        (1.984770029284523e-05 - 1.8938137411531624e-06j,
-         -3.520130381719108e-07 - 1.7383390882975008e-05j),
-        (-4.6180393278975455e-06 - 6.403690476432977e-07j,
-         -6.515292922034885e-07 + 5.391263560626258e-06j)]}
-EXTRAS_AT_300 = [
-    -1.3428854319195582 + 243.06221620432456j, -0.8031419285158923 + 244.4019981744441j,
-    -24.180108503224687 + 1176.8084600486607j, -26.816377362577015 + 1299.4164682675078j]
-EXTRAS_DISC = [
-    (6.961132549448885e-07 + 6.354660914507501e-09j,
-     6.729924540653384e-09 - 6.784397435411925e-07j),
-    (-5.320792749385035e-06 - 1.4780989555879207e-08j,
-     -1.1199898276957084e-08 + 5.426433507672576e-06j),
-    (-3.7660865733592404e-06 - 1.4908241351227252e-08j,
-     -1.1526895419231148e-08 + 3.8058882138206476e-06j),
-    (-3.402503691364658e-06 - 2.6164461717460557e-08j,
-     -2.176980616983353e-08 + 3.450600306574059e-06j)]
 
 
 @pytest.fixture(scope='module')
@@ -66,41 +30,30 @@ def imported(tmp_path_factory):
     """Return the models of both files, brought over by the command."""
     folder = tmp_path_factory.mktemp('imported')
     for name in ('hollow', 'extras'):
-        assert main(['import-ross', str(FILES / f'{name}.toml'), '-o',
+        assert main(['import-ross', str(ROSS_FILES / f'{name}.toml'), '-o',
                      str(folder / f'{name}.yaml')]) == 0
     return {name: models.coupled_model(load(folder / f'{name}.yaml'), NO_CACHE)
             for name in ('hollow', 'extras')}
 
 
-def ross_response(model, disc):
-    """Return what ROSS calls horizontal and vertical of a disc, (4, 2), for 1e-4 kg m."""
-    # theory/rotor.md: its phase 0 is our -pi/2, its x our -x
-    unbalance = np.zeros(len(model.planes), dtype=complex)
-    unbalance[0] = 1e-4 * np.exp(-0.5j * np.pi)
-    motion = model.unbalance_response(SPEEDS, unbalance).displacement
-    first = model.channels.index(f'{disc}_x')
-    return motion[:, first:first + 2] * [-1.0, 1.0]
-
-
-@pytest.mark.parametrize('name, speed, expected', [
-    ('hollow', 500.0, HOLLOW_AT_500), ('extras', 300.0, EXTRAS_AT_300)])
-def test_modes_are_those_of_ross(imported, name, speed, expected):
+@pytest.mark.parametrize('name', ['hollow', 'extras'])
+def test_modes_are_those_of_ross(imported, name):
+    speed, expected, _ = ross_figures(name)
     found = campbell(imported[name], np.array([speed]), 4).eigenvalue[0]
     np.testing.assert_allclose(found.real + 1j * np.abs(found.imag), expected, rtol=1e-9)
 
 
 def test_criticals_are_those_of_ross(imported):
     found = [one.speed for one in critical_speeds(imported['hollow'], (10.0, 1000.0))]
-    np.testing.assert_allclose(found, HOLLOW_CRITICALS, rtol=1e-9)
+    np.testing.assert_allclose(found, ross_criticals(), rtol=1e-9)
 
 
-@pytest.mark.parametrize('name, disc, expected', [
-    ('hollow', 'wheel', HOLLOW_RESPONSE['wheel']),
-    ('hollow', 'overhung_fan', HOLLOW_RESPONSE['overhung_fan']),
-    ('extras', 'disk_0', EXTRAS_DISC)])
-def test_response_is_that_of_ross(imported, name, disc, expected):
+@pytest.mark.parametrize('name, disc', [
+    ('hollow', 'wheel'), ('hollow', 'overhung_fan'), ('extras', 'disk_0')])
+def test_response_is_that_of_ross(imported, name, disc):
+    _, _, responses = ross_figures(name)
     # only with the right signs of cross terms and axes: they reach the small quadrature parts
-    np.testing.assert_allclose(ross_response(imported[name], disc), expected, rtol=1e-8)
+    np.testing.assert_allclose(ross_response(imported[name], disc), responses[disc], rtol=1e-8)
 
 
 def test_equal_elements_become_one_section_and_keep_the_mesh(imported):
@@ -118,7 +71,7 @@ def test_bearing_below_a_bearing_is_its_pedestal(imported):
 
 def changed(tmp_path, *changes):
     """Return a copy of extras.toml with some text replaced."""
-    text = (FILES / 'extras.toml').read_text()
+    text = (ROSS_FILES / 'extras.toml').read_text()
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)
@@ -154,7 +107,8 @@ def test_what_cannot_be_carried_over_is_said_twice(tmp_path, capsys, old, new, l
 
 
 def test_nothing_lost_is_said_too(tmp_path, capsys):
-    assert main(['import-ross', str(FILES / 'hollow.toml'), '-o', str(tmp_path / 'c.yaml')]) == 0
+    assert main([
+        'import-ross', str(ROSS_FILES / 'hollow.toml'), '-o', str(tmp_path / 'c.yaml')]) == 0
     assert 'not carried over: nothing\n' in capsys.readouterr().err
 
 
@@ -168,7 +122,7 @@ def test_second_layer_of_a_shaft_is_kept_as_mass(tmp_path):
 
 
 def test_speed_range_may_be_chosen(tmp_path):
-    assert main(['import-ross', str(FILES / 'hollow.toml'), '-o', str(tmp_path / 'c.yaml'),
+    assert main(['import-ross', str(ROSS_FILES / 'hollow.toml'), '-o', str(tmp_path / 'c.yaml'),
                  '--rpm', '600:9000:2']) == 0
     np.testing.assert_allclose(load(tmp_path / 'c.yaml').speed_range,
                                [20.0 * np.pi, 300.0 * np.pi])

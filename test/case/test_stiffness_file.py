@@ -102,7 +102,7 @@ def test_every_verb_answers_on_a_file_that_knows_no_rest(tmp_path, capsys):
                       ['plot', '-o', str(tmp_path / 'plots')]):
         assert main([arguments[0], str(PAPER), *arguments[1:], *settings]) == 0, arguments
     said = capsys.readouterr().out
-    # of the stiffness at the slowest speed, 1 Hz; the design note has 1.444e8 N/m at rest
+    # of the stiffness at the slowest speed, 1 Hz; 4 G r0 / (1 - nu) is 1.444e8 N/m at rest
     assert float(re.search(r'block: slowest stiffness z +(\S+) N/m', said)[1]) == pytest.approx(
         1.444e8, rel=0.01)
 

@@ -63,7 +63,7 @@ def test_rotational_cone_is_a_spring_beside_a_dashpot_in_series_with_an_inertia(
 
 
 def test_slow_rocking_radiates_as_the_cone_must():
-    # b0^3 / 3 of K: 0.545 a0^3 at nu = 1/3 (design note, sec. 1.2).
+    # b0^3 / 3 of K: 0.545 a0^3 at nu = 1/3.
     rocking = stiffness(1.0 / 3.0, 0.01)[4]
     assert rocking.imag / rocking.real == pytest.approx(0.545 * 0.01**3, rel=2e-3)
 

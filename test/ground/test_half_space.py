@@ -1,8 +1,6 @@
 """The infinite element model of a contact: scales, signs, shapes and what it refuses."""
 
-import csv
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +10,8 @@ from rotorsoil_ros.ground.elements.tabulate import tabulate
 from rotorsoil_ros.ground.half_space import a0_range, InfiniteElementModel
 from rotorsoil_ros.ground.soil import Circle, equivalent_radii, Rectangle, Soil
 
-REFERENCE = Path(__file__).parents[1] / 'reference' / 'soil'
+from oracles.published import half_space
+
 SOIL = Soil(shear_modulus=48e6, poisson_ratio=0.25, density=1900.0, loss_factor=0.1)
 ELASTIC = Soil(shear_modulus=48e6, poisson_ratio=0.25, density=1900.0)
 CIRCLE = Circle(0.5)
@@ -40,14 +39,9 @@ def a0_of(omega, length, soil=SOIL):
 
 
 def test_the_whole_way_agrees_with_the_rigorous_disc(disc):
-    path = REFERENCE / 'disk_bonded_nu0.25_eta0.10.csv'
-    if not path.is_file():
-        pytest.skip(f'{path} is not there')
-    with path.open() as stream:
-        rows = list(csv.reader(line for line in stream if line[0] == 'F'))
-    a0 = np.array([float(row[1]) for row in rows if row[0] == 'Fv'])
-    expected = {name: np.array([complex(float(re), float(im)) for key, _, re, im in rows
-                                if key == name]) for name in ('Fh', 'Fv', 'Fr', 'Ft', 'Fhr')}
+    names = ('Fh', 'Fv', 'Fr', 'Ft', 'Fhr')
+    a0, columns = half_space('disk_bonded_nu0.25_eta0.10.csv', names)
+    expected = dict(zip(names, columns.T, strict=True))
     soft = Soil(shear_modulus=2.0, poisson_ratio=0.25, density=8.0, loss_factor=0.1)
     # c_s = 1/2, r0 = 3: omega = a0 / 6, G r = 6, G r^2 = 18, G r^3 = 54.
     got = InfiniteElementModel(soft, Circle(3.0), disc).compliance(a0 / 6.0)

@@ -11,7 +11,7 @@ from rotorsoil_ros.ground.soil import Circle, equivalent_radii, Rectangle, Rigid
 
 def test_wave_speeds_of_the_paper_are_those_of_three_dimensions():
     soil = Soil(48e6, 0.25, 1900.0, 0.10)
-    assert soil.shear_wave_speed == pytest.approx(158.944, abs=5e-4)  # digits of the note
+    assert soil.shear_wave_speed == pytest.approx(158.944, abs=5e-4)  # sqrt(48e6 / 1900)
     # sqrt(3) at nu = 1/4; the paper's 259.2 m/s is the plane-stress speed
     assert soil.pressure_wave_speed == pytest.approx(math.sqrt(3.0) * soil.shear_wave_speed)
 

@@ -58,7 +58,7 @@ def test_given_soil_lies_in_its_band(models, envelope):
 
 
 def test_soil_matters_near_the_resonance_and_not_far_above_it():
-    # Design note, sec. 5.2: below 1.5 f_n the band matters, above 3 f_n mass decides.
+    # A mass on a spring: below 1.5 f_n the band matters, above 3 f_n mass decides.
     soft = [paper_machine(ConeModel(soil, CONTACT), mass=2000.0)
             for soil in SoilSpread(samples=5).soils(SOIL)]
     block = soft[0].channels.index('block_z')

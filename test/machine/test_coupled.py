@@ -10,46 +10,34 @@ from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.rotor.assembly import Disc, Material, Probe, Rotor, ShaftSection
+from rotorsoil_ros.rotor.assembly import Disc, Material, Rotor, ShaftSection
 
 from machines import (
     bearing,
+    channel,
     CONE,
     CONTACT,
     LENGTH,
     paper_machine,
-    REFERENCE,
     Restrained,
     SOIL,
     STEEL,
+    two_blocks,
     uniform_rotor,
 )
 from oracles.dense import dense_response
-from test_assembly import friswell, lalanne_ferraris, published
+from oracles.published import (
+    friswell,
+    jeffcott,
+    lalanne_ferraris,
+    published,
+    response,
+    ROSS_STATIONS,
+    ROSS_UNBALANCE,
+)
 
 UNBALANCE = np.array([1e-5, 4e-6 * np.exp(1.1j)])
 SPEEDS = np.linspace(1.0, 950.0, 61)
-
-
-def reference(name):
-    """Return a reference file as frequencies [rad/s] and complex columns by name."""
-    path = REFERENCE / 'rotor' / name
-    if not path.exists():
-        pytest.skip(f'reference data not beside the checkout: {name}')
-    rows = np.genfromtxt(path, delimiter=',', names=True)
-    columns = {column[:-3]: rows[column] + 1j * rows[column[:-3] + '_im']
-               for column in rows.dtype.names if column.endswith('_re')}
-    return 2.0 * np.pi * rows['freq_hz'], columns
-
-
-def channel(model, prediction, name):
-    """Return the displacement of one channel."""
-    return prediction.displacement[:, model.channels.index(name)]
-
-
-# ROSS has y up and x to the other side; its load is our unbalance at phase -pi/2.
-ROSS_STATIONS = {'disc1': 'disc_1', 'brgA': 'bearing_1_journal', 'brgB': 'bearing_2_journal'}
-ROSS_UNBALANCE = np.array([0.01 * np.exp(-0.5j * np.pi), 0.0])
 
 
 @pytest.mark.parametrize('name, soil, base', [
@@ -57,11 +45,11 @@ ROSS_UNBALANCE = np.array([0.01 * np.exp(-0.5j * np.pi), 0.0])
     ('shared_mf42', Restrained(CONE, 'x', 'z'), 'block'),
     ('sharedrock_mf42', Restrained(CONE, 'x', 'z', 'ry'), 'bearing_1_housing')])
 def test_response_is_that_of_ross(name, soil, base):
-    omega, columns = reference(f'ross_Q1_{name}_0-150Hz.csv')
+    omega, columns = response(f'ross_Q1_{name}_0-150Hz.csv')
     model = paper_machine(soil)
     prediction = model.unbalance_response(omega, ROSS_UNBALANCE)
     keep = np.ones(len(omega), dtype=bool)
-    if name == 'rigid':  # undamped but for 1e-8: the note says to leave the peaks out
+    if name == 'rigid':  # undamped but for 1e-8: the peaks have no figures to compare
         for critical in (44.01, 48.86, 123.12, 129.48):
             keep &= np.abs(omega / (2.0 * np.pi * critical) - 1.0) > 1.1e-3
     stations = {**ROSS_STATIONS, **({'fnd': base} if base else {})}
@@ -75,26 +63,12 @@ def test_response_is_that_of_ross(name, soil, base):
 
 
 def test_rocking_block_is_that_of_an_independent_dense_solve():
-    omega, columns = reference('ref_Q1_sharedrock_mf42_block.csv')
+    omega, columns = response('ref_Q1_sharedrock_mf42_block.csv')
     model = paper_machine(Restrained(CONE, 'x', 'z', 'ry'))
     prediction = model.unbalance_response(omega, ROSS_UNBALANCE)
     for theirs, ours, sign in (('u', 'x', -1.0), ('w', 'z', 1.0), ('phi', 'ry', -1.0)):
         np.testing.assert_allclose(sign * channel(model, prediction, f'block_{ours}'),
                                    columns[theirs], rtol=1e-6)
-
-
-def jeffcott(given, *, damping_at_disc=0.0, foundation=None, stiffness=1e14, damping=0.0):
-    """Return a disc in the middle of a massless shaft; a damper at it needs a third bearing."""
-    shaft = Material(given['E'], 0.3, 0.0)
-    supports = [bearing('a', 0.0, stiffness=stiffness, damping=damping, foundation=foundation),
-                bearing('b', given['L'], stiffness=stiffness, damping=damping,
-                        foundation=foundation)]
-    if damping_at_disc:
-        supports.append(bearing('damper', given['L'] / 2.0, stiffness=0.0,
-                                damping=damping_at_disc, foundation=None))
-    return uniform_rotor(length=given['L'], diameter=given['d'], elements=2, material=shaft,
-                         discs=[Disc('disc', given['L'] / 2.0, given['m'], 0.0, 0.0)],
-                         bearings=supports)
 
 
 @pytest.mark.usefixtures('no_shear')
@@ -150,24 +124,6 @@ def test_friswell_rotor_moves_as_ross_says():
     probe = (x + z) / math.sqrt(2.0)
     np.testing.assert_allclose(np.abs(probe), expected[:2], rtol=rtol)
     np.testing.assert_allclose(major, expected[2:], rtol=rtol)
-
-
-def two_blocks(cross=0.0):
-    """Return a machine whose bearings stand on two blocks, one of them by two bearings."""
-    stiffness = np.array([[2e8, cross], [-cross, 1e8]])
-    damping = np.array([[4e4, 1e3], [-1e3, 2e4]])
-    section = ShaftSection(2.0, (0.08, 0.10), (0.0, 0.02), 10, STEEL)
-    rotor = Rotor(
-        0.9, (section,),
-        (Disc('wheel', 0.8, 60.0, 1.5, 2.9), Disc('coupling', 2.0, 12.0, 0.1, 0.2)),
-        (bearing('one', 0.1, stiffness=stiffness, damping=damping, foundation='left'),
-         bearing('two', 1.4, stiffness=stiffness, damping=damping, foundation='right'),
-         bearing('three', 1.9, stiffness=3e8, damping=1e4, foundation='right')),
-        (Probe('probe', 0.55),))
-    blocks = (Foundation('left', Rectangle(0.5, 0.4), 0.1, 900.0, 0.3, (60.0, 70.0, 80.0)),
-              Foundation('right', Rectangle(0.5, 0.6), 1.6, 1500.0, 0.35, (90.0, 95.0, 120.0)))
-    soils = tuple(ConeModel(SOIL, block.contact) for block in blocks)
-    return CoupledModel(rotor, blocks, soils)
 
 
 @pytest.mark.parametrize('model', [

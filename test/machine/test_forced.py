@@ -14,6 +14,7 @@ from rotorsoil_ros.rotor.bearing import Pedestal
 
 from machines import (
     bearing,
+    channel,
     CONE,
     CONTACT,
     elastic_machine,
@@ -24,7 +25,7 @@ from machines import (
     uniform_rotor,
 )
 from oracles.dense import dense_forced, dense_response
-from test_coupled import channel, jeffcott, reference, ROSS_STATIONS
+from oracles.published import jeffcott, response, ROSS_STATIONS
 
 SPEEDS = np.linspace(1.0, 950.0, 41)
 OMEGAS = np.linspace(0.0, 1500.0, 31)
@@ -41,7 +42,7 @@ def assert_same(got, expected):
 
 @pytest.mark.parametrize('axis, theirs', [('x', 'x'), ('z', 'y')])
 def test_impact_test_at_rest_is_that_of_ross(axis, theirs):
-    omega, columns = reference('ross_Q1_shared_mf42_n0rpm_0-150Hz.csv')
+    omega, columns = response('ross_Q1_shared_mf42_n0rpm_0-150Hz.csv')
     model = paper_machine(Restrained(CONE, 'x', 'z'))
     found = model.frequency_response(omega, speed=0.0, channel=f'disc_1_{axis}')
     for name, station in {**ROSS_STATIONS, 'fnd': 'block'}.items():

@@ -30,11 +30,11 @@ from machines import (
     Springs,
     springy_soils,
     STEEL,
+    two_blocks,
     uniform_rotor,
 )
 from oracles.dense import dense_eigenvalues, rotor_matrices
-from test_assembly import friswell, lalanne_ferraris, pinned_shaft, published
-from test_coupled import two_blocks
+from oracles.published import friswell, lalanne_ferraris, pinned_shaft, published
 
 SPEEDS = np.array([0.0, 310.0, 900.0])
 

@@ -12,8 +12,7 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.rotor.assembly import Disc
 
-from machines import bearing, paper_machine, STEEL, uniform_rotor
-from test_coupled import two_blocks
+from machines import bearing, paper_machine, STEEL, two_blocks, uniform_rotor
 
 RANGE = (2.0 * math.pi, 300.0 * math.pi)
 UNBALANCE = np.array([1e-5, 3e-6 * np.exp(2.0j)])

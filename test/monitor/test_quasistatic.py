@@ -32,7 +32,7 @@ def swept_amplitude(resonance, rate, time, start):
 
 @pytest.mark.parametrize('rate, ratio', [(2.0, 0.903), (20.0, 0.58)])
 def test_peak_of_a_sweep_depends_on_the_passage_number(rate, ratio):
-    # Design note, sec. 5.1: 25 Hz, zeta = 0.02: 2 Hz/s 0.903, 20 Hz/s 0.58 of the steady peak.
+    # By integration over time: 25 Hz, zeta = 0.02: 2 Hz/s 0.903, 20 Hz/s 0.58 of the steady peak.
     resonance = Resonance(2.0 * math.pi * 25.0, 0.02)
     alpha = 2.0 * math.pi * rate
     assert passage_number(resonance, alpha) == pytest.approx({2.0: 0.886, 20.0: 0.280}[rate],

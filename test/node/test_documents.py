@@ -7,9 +7,7 @@ import yaml
 
 from rotorsoil_ros.node.parameters import OF_MACHINE, OWN
 
-from test_node import Bench, bench
-
-__all__ = ['bench']
+from graphs import Bench
 
 ROOT = Path(__file__).parents[2]
 # With use_sim_time; when a sensor publishes.

@@ -18,9 +18,7 @@ from std_srvs.srv import Trigger
 
 from rotorsoil_ros.bags import reader as bag_reader
 
-from test_node import assert_answers, Bench, bench, exact, joint_state, LATCHED, STAMP, stamp_ns
-
-__all__ = ['bench']
+from graphs import assert_answers, Bench, exact, joint_state, LATCHED, STAMP, stamp_ns
 
 
 @pytest.fixture

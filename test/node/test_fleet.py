@@ -4,10 +4,7 @@ import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from test_node import joint_state, stamp_ns
-from test_process import start
-
-__all__ = ['start']
+from graphs import joint_state, stamp_ns
 
 MACHINES = 50
 ROUNDS = 10

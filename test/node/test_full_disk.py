@@ -13,10 +13,7 @@ import yaml
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.recover import recover
 
-from test_node import stamp_ns
-from test_process import speak, start
-
-__all__ = ['start']
+from graphs import DEADLINE_S, speak, stamp_ns
 
 AMPLITUDE = '/rotorsoil/fan/amplitude'
 DISK_MIB = 2
@@ -57,7 +54,7 @@ def test_a_disk_that_is_full_is_logged_to_again_when_there_is_room(start, graph,
     said += speak(graph, lambda said: reports[-1][0] == b'\x00' and said)
     graph.until(lambda: answered[-1] == said[-1], 'the last answer')
     process.send_signal(signal.SIGTERM)
-    _, told = process.communicate(timeout=10.0)
+    _, told = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 0
     assert told.count('No space left on device') == 2  # it failed; it goes on without ...
     assert 'Traceback' not in told

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 import numpy as np
@@ -16,118 +15,14 @@ import pytest
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.node.node import RotorsoilNode
-from rotorsoil_ros.wire.messages import moduli, phases
 
-STAMP = 1_700_000_000_000_000_001
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-def joint_state(velocity, *, stamp=STAMP, names=('rotor',)):
-    message = JointState(name=list(names), velocity=list(velocity))
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-    return message
-
-
-def stamp_ns(message):
-    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-
-
-class Bench:
-    """A node under test, and a probe that talks and listens to it."""
-
-    def __init__(self, graph, cache, case_file):
-        self.graph = graph
-        self.case_file = str(case_file)
-        self.probe = graph.probe
-        self.cache = str(cache)
-        self.heard = {}
-
-    def node(self, *machines, **parameters):
-        """Create a node; a keyword a__b sets the parameter a.b."""
-        values = {'cache': self.cache, 'speed_depth': 1000, 'log.rerun': False}
-        values |= {'machines': list(machines)} if machines else {}
-        values |= {f'{machine}.case': self.case_file for machine in machines}
-        cli = parameters.pop('cli', [])
-        values |= {name.replace('__', '.'): value for name, value in parameters.items()}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        return self.graph.add(RotorsoilNode(
-            context=self.graph.context, parameter_overrides=overrides, cli_args=cli))
-
-    def active(self, *machines, **parameters):
-        node = self.node(*machines, **parameters)
-        assert node.start()
-        return node
-
-    def hear(self, topic, kind=JointState, profile=1000):
-        """Collect the messages of a topic."""
-        heard = self.heard.setdefault(topic, [])
-        self.probe.create_subscription(kind, topic, heard.append, profile)
-        return heard
-
-    def answers(self, machine='fan'):
-        """Collect amplitudes and phases of a machine."""
-        return tuple(self.hear(f'/rotorsoil/{machine}/{name}') for name in ('amplitude', 'phase'))
-
-    def speaker(self, topic='/fan/joint_states', kind=JointState, listeners=('amplitude', 'phase'),
-                reliability=ReliabilityPolicy.RELIABLE):
-        """Return what publishes, once everybody who matters has found each other."""
-        publisher = self.probe.create_publisher(
-            kind, topic, QoSProfile(depth=1000, reliability=reliability))
-        machine = topic.split('/')[1]
-        self.graph.until(lambda: publisher.get_subscription_count() and all(
-            self.probe.count_publishers(f'/rotorsoil/{machine}/{name}') for name in listeners),
-            'discovery')
-        self.settle()
-        return publisher.publish
-
-    def settle(self):
-        """Wait until the probe's subscriptions are matched on both sides."""
-        for node in self.graph.nodes[1:]:
-            for publisher in node.publishers:
-                if publisher.topic_name in self.heard:
-                    self.graph.until(publisher.get_subscription_count, 'matching')
-
-    def call(self, kind, name, request):
-        client = self.probe.create_client(kind, name)
-        self.graph.until(client.service_is_ready, name)
-        future = client.call_async(request)
-        self.graph.until(future.done, name)
-        return future.result()
-
-    def change(self, transition):
-        return self.call(ChangeState, '/rotorsoil/change_state', ChangeState.Request(
-            transition=Transition(id=transition))).success
-
-    def state(self):
-        return self.call(GetState, '/rotorsoil/get_state', GetState.Request()).current_state.label
-
-
-@pytest.fixture
-def bench(graph, cache, case_file, machine):
-    bench = Bench(graph, cache, case_file)
-    yield bench
-    for node in graph.nodes[1:]:
-        node.release()
-
-
-def exact(machine, speed, unbalance=None):
-    unbalance = machine.case.unbalance if unbalance is None else unbalance
-    return machine.table.predictor(unbalance).predict(np.array([speed]))
-
-
-def assert_answers(amplitude, phase, prediction):
-    for message, (outer, velocity) in (
-            (amplitude, moduli(prediction)), (phase, phases(prediction))):
-        np.testing.assert_array_equal(message.position, outer[0, 0])
-        np.testing.assert_array_equal(message.velocity, velocity[0])
-        np.testing.assert_array_equal(message.effort, outer[0, 1])
+from graphs import assert_answers, exact, joint_state, LATCHED, STAMP, stamp_ns
 
 
 def test_a_speed_is_answered_with_the_bits_of_the_table_and_its_own_stamp(bench, machine):

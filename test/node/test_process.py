@@ -1,49 +1,20 @@
 """The process starts fast, stops at once at a signal, and leaves a finished log."""
 
-import os
 import signal
-import subprocess
-import sys
 import time
 
 import pytest
-from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.wire.messages import JOINT_STATE
 
+from graphs import speak
+
 # Far above what benchmarks/lookup.py measures (0.3 s and 1.5 s): a busy machine is no failure,
 # a hang is one.
 STOPS_WITHIN_S = 4.0
 STARTS_WITHIN_S = 10.0
-
-
-@pytest.fixture
-def start(case_file, cache, machine):
-    """Return what starts a node and waits until it is active."""
-    processes = []
-
-    def run(*parameters, until='active'):
-        arguments = ['machines:=[fan]', f'fan.case:={case_file}', f'cache:={cache}', *parameters]
-        command = [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args']
-        for argument in arguments:
-            command += ['-p', argument]
-        environment = {**os.environ, 'ROS_DOMAIN_ID': str(40 + os.getpid() % 20)}
-        process = subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, env=environment)
-        processes.append(process)
-        told = []
-        for line in process.stderr:
-            told.append(line)
-            if until in line:
-                break
-        return process, told
-
-    yield run
-    for process in processes:
-        process.kill()
-        process.communicate()
 
 
 @pytest.mark.parametrize('stop, executor', [
@@ -74,24 +45,6 @@ def test_bad_input_ends_the_process_with_2_and_one_line(start, parameter, compla
     assert process.wait(10.0) == 2
     assert len(told) == 1
     assert complaint in told[0]
-
-
-def speak(graph, until):
-    """Publish speeds of the fan at 100 Hz until something holds; return their stamps [ns]."""
-    publish = graph.probe.create_publisher(JointState, '/fan/joint_states', 1000).publish
-    said = []
-
-    def tell():
-        message = JointState(name=['rotor'], velocity=[300.0])
-        said.append(time.time_ns())
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(said[-1], 10**9)
-        publish(message)
-
-    graph.until(lambda: graph.probe.count_subscribers('/fan/joint_states'), 'discovery')
-    timer = graph.probe.create_timer(0.01, tell)
-    graph.until(lambda: until(said), 'enough speeds')
-    graph.probe.destroy_timer(timer)
-    return said
 
 
 def test_a_kill_loses_at_most_a_second_and_the_next_start_saves_the_rest(

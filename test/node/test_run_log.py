@@ -10,11 +10,11 @@ from rotorsoil_ros.bags.retention import make_room
 from rotorsoil_ros.bags.writer import new_directory
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 
-from test_bag import joint_records, START
-from test_viewer import column, predicted
+from graphs import DEADLINE_S
+from recordings import column, predicted
+from records import joint_records, START
 
 SECOND = 10**9
-DEADLINE_S = 20.0
 
 
 def settings(directory, **others):

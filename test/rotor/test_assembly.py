@@ -1,6 +1,5 @@
 """Shaft, disc and gyroscopic matrices against closed forms and published rotors."""
 
-import json
 import math
 
 import numpy as np
@@ -12,49 +11,15 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection
 from rotorsoil_ros.rotor.beam import shear_coefficient
 
-from machines import bearing, paper_rotor, REFERENCE, STEEL, uniform_rotor
+from machines import bearing, paper_rotor, STEEL, uniform_rotor
 from oracles.dense import rotor_matrices
-
-CASES = REFERENCE / 'rotor' / 'benchmarks.json'
-
-
-def published(name):
-    """Return inputs, expected figures and tolerance of a benchmark case."""
-    if not CASES.exists():
-        pytest.skip(f'reference data not beside the checkout: {CASES.name}')
-    case = {case['id']: case for case in json.loads(CASES.read_text())}[name]
-    return case['inputs'], np.array(case['expected']), case['suggested_rtol']
-
-
-def whirl_frequencies(rotor, speed, count):
-    """Return the lowest natural frequencies [rad/s] at one speed, from the full matrices."""
-    stiffness, mass, gyroscopic = rotor_matrices(rotor)
-    damping = speed * gyroscopic
-    for one in rotor.bearings:
-        node = 4 * rotor.node_of(one.position)
-        stiffness[node:node + 2, node:node + 2] += one.stiffness
-        damping[node:node + 2, node:node + 2] += one.damping
-    size = len(mass)
-    left = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -damping]])
-    right = scipy.linalg.block_diag(np.eye(size), mass)
-    values = scipy.linalg.eigvals(left, right)
-    return np.sort(np.abs(values[values.imag > 0.0]))[:count]
-
-
-def hollow_disc(name, position, *, inner, outer, width, density):
-    """Return a cylindrical disc of given diameters."""
-    mass = density * math.pi / 4.0 * (outer**2 - inner**2) * width
-    polar = mass * (outer**2 + inner**2) / 8.0
-    return Disc(name, position, mass, polar / 2.0 + mass * width**2 / 12.0, polar)
-
-
-def pinned_shaft(given, spring=1e13):
-    """Return a uniform shaft between stiff supports."""
-    return uniform_rotor(
-        length=given['L'], diameter=given['d'], elements=28,
-        material=Material(given['E'], given['nu'], given['rho']),
-        bearings=[bearing('a', 0.0, stiffness=spring, foundation=None),
-                  bearing('b', given['L'], stiffness=spring, foundation=None)])
+from oracles.published import (
+    friswell,
+    lalanne_ferraris,
+    pinned_shaft,
+    published,
+    whirl_frequencies,
+)
 
 
 @pytest.mark.usefixtures('no_shear')
@@ -142,34 +107,6 @@ def test_three_disc_rotor_of_lalanne_and_ferraris():
     found = whirl_frequencies(rotor, speed, 12) / (2.0 * math.pi)
     nearest = found[np.abs(found[:, None] - expected).argmin(axis=0)]
     np.testing.assert_allclose(nearest, expected, rtol=rtol)
-
-
-def lalanne_ferraris(given, damping_x, damping_z):
-    """Return the three-disc rotor of the book, on ground that does not move."""
-    discs = [hollow_disc(f'disc_{i + 1}', position, inner=2.0 * given['disc_ri'],
-                         outer=2.0 * outer, width=width, density=given['rho'])
-             for i, (position, outer, width) in enumerate(
-                 zip(given['disc_pos'], given['disc_ro'], given['disc_h'], strict=True))]
-    return uniform_rotor(
-        length=given['L'], diameter=given['shaft_d'], elements=13,
-        material=Material(given['E'], given['nu'], given['rho']), discs=discs,
-        bearings=[bearing(name, position, foundation=None,
-                          stiffness=np.diag([given['kxx'], given['kzz']]),
-                          damping=np.diag([damping_x, damping_z]))
-                  for name, position in zip('ab', given['brg_pos'], strict=True)])
-
-
-def friswell(given, stiffness):
-    """Return the two-disc rotor of Friswell et al. (2010), example 5.9."""
-    material = Material(given['E'], given['E'] / given['G'] / 2.0 - 1.0, given['rho'])
-    discs = [hollow_disc(f'disc_{i + 1}', position, inner=given['disc_di'], outer=outer,
-                         width=given['disc_h'], density=given['rho'])
-             for i, (position, outer) in enumerate(
-                 zip(given['disc_pos'], given['disc_do'], strict=True))]
-    return uniform_rotor(
-        length=given['L'], diameter=given['d'], elements=given['n_elements'], material=material,
-        discs=discs, bearings=[bearing(name, position, stiffness=stiffness, foundation=None)
-                               for name, position in (('a', 0.0), ('b', given['L']))])
 
 
 @pytest.mark.parametrize('name, stiffness, rpm', [

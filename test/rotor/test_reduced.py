@@ -7,8 +7,7 @@ from rotorsoil_ros.rotor.assembly import Disc, Material
 from rotorsoil_ros.rotor.reduced import ReducedRotor
 from rotorsoil_ros.rotor.whirl import held
 
-from machines import bearing, paper_machine, STEEL, uniform_rotor
-from test_coupled import two_blocks
+from machines import bearing, paper_machine, STEEL, two_blocks, uniform_rotor
 
 MODEL = paper_machine()
 SPRINGS = MODEL.nominal_springs

@@ -1,0 +1,10 @@
+"""A log under way."""
+
+import pytest
+
+from rotorsoil_ros.bags.writer import BagWriter, new_directory
+
+
+@pytest.fixture
+def bag(tmp_path):
+    return BagWriter(new_directory(tmp_path, 'run'))

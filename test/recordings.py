@@ -1,0 +1,35 @@
+"""What a recording of rerun holds, and predictions to record."""
+
+import warnings
+
+import numpy as np
+
+from rotorsoil_ros.events import Predicted
+
+START = 1_790_000_000_000_000_000
+PERIOD = 10**7
+
+
+def column(path, entity, component, *, static=False):
+    """Read stamps [ns] and values of one component of one entity."""
+    from rerun.chunk import RrdReader
+    stamps, values = [], []
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # of the missing footer
+        for chunk in RrdReader(str(path)).stream():
+            batch = chunk.to_record_batch()
+            if (chunk.entity_path == entity and chunk.is_static == static
+                    and component in batch.schema.names):
+                values += batch.column(component).to_pylist()
+                if not static:
+                    stamps += batch.column('time').cast('int64').to_pylist()
+    return stamps, values
+
+
+def predicted(machine, speeds, start=START, period=PERIOD):
+    speed = np.asarray(speeds, dtype=float)
+    predictor = machine.table.predictor(machine.case.unbalance)
+    known = predictor.covers(speed)
+    prediction = predictor.predict(np.where(known, speed, 300.0))
+    prediction.parts[~known] = np.nan
+    return Predicted('fan', start + period * np.arange(len(speed)), prediction)

@@ -1,0 +1,39 @@
+"""Messages of a log for the tests, and all that is in one."""
+
+import struct
+
+import numpy as np
+from rosbags.typesys import get_typestore, Stores
+
+from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.wire.messages import FLOAT64, JOINT_STATE, JointStateWriter, Records, STRING
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+START = 1_700_000_000_000_000_001
+
+
+def joint_records(count, *, topic='/fan/joint_states', start=START):
+    stamps = [start + 10**6 * row for row in range(count)]
+    values = np.random.default_rng(count).normal(size=(count, 3, 1))
+    return Records(topic, JOINT_STATE, stamps, JointStateWriter(['rotor']).write(stamps, values))
+
+
+def float_records(count, *, topic='/fan/rotor/speed', start=START):
+    stamps = [start + 10**6 * row for row in range(count)]
+    return Records(topic, FLOAT64, stamps, [
+        b'\0\1\0\0' + struct.pack('<d', row) for row in range(count)])
+
+
+def string_records(*, start=START):
+    payload = STORE.serialize_cdr(STORE.types[STRING]('{}'), STRING)
+    return Records('/rotorsoil/fan/model', STRING, [start], [bytes(payload)], latched=True)
+
+
+def read_all(path):
+    return [(source.topic, time, payload)
+            for source, time, payload in bag_reader.messages(path, lambda *_: True)]
+
+
+def written(*batches):
+    return sorted((time, records.topic, payload) for records in batches
+                  for time, payload in zip(records.log_time_ns, records.payloads, strict=True))
