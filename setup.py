@@ -21,7 +21,7 @@ setup(
     python_requires='>=3.11,<3.14',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     # rotorsoil_ros/config is a link to config: reachable without an ament index, kept once.
-    package_data={NAME: ['py.typed', 'config/*.yaml']},
+    package_data={NAME: ['py.typed', 'config/*.yaml', 'wire/interfaces/*/msg/*.msg']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

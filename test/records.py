@@ -6,7 +6,8 @@ import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.wire.messages import FLOAT64, JOINT_STATE, JointStateWriter, Records, STRING
+from rotorsoil_ros.wire.definitions import FLOAT64, JOINT_STATE, STRING
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 START = 1_700_000_000_000_000_001

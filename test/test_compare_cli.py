@@ -26,7 +26,8 @@ from rotorsoil_ros.monitor.identification import identify_case, Wanted
 from rotorsoil_ros.monitor.rules import Rules
 from rotorsoil_ros.monitor.verdict import compare as judge, Verdict
 from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 ROOT = Path(__file__).parents[1]
 KIT = str(ROOT / 'config' / 'rk4_rotor_kit.yaml')

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 import rotorsoil_ros
-from rotorsoil_ros.wire.topics import type_hash
+from rotorsoil_ros.wire.definitions import type_hash
 
 VERSION = 9  # of rosbag2 in Jazzy
 WRITER = 'rotorsoil_ros'

@@ -13,9 +13,10 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.units import rpm_to_rad_s, SECONDS_PER_MINUTE
-from rotorsoil_ros.wire.cdr import ARRAYS, IMU
+from rotorsoil_ros.wire.cdr import ARRAYS
+from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import raw_channel, ROTOR_JOINT, SPEED_TOPICS, SpeedReader, TOPICS
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 BATCH = 1024
 MICROMETRE = 1e-6

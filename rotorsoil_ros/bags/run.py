@@ -18,9 +18,10 @@ from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.orders import order_vectors, OrderVector, SpeedTrack, turns_with
 from rotorsoil_ros.monitor.points import nearest, Signal
 from rotorsoil_ros.monitor.verdict import Run
-from rotorsoil_ros.wire.cdr import AXES, Cursor, IMU, ImuReader, JointStateReader, JointStates
+from rotorsoil_ros.wire.cdr import AXES, Cursor, ImuReader, JointStateReader, JointStates
+from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE, STRING
 from rotorsoil_ros.wire.handlers import are_stamps, ROTOR_JOINT, SPEED_TOPICS, SpeedReader
-from rotorsoil_ros.wire.messages import FLOAT64, JOINT_STATE, Records, STRING
+from rotorsoil_ros.wire.messages import Records
 
 AT_MOST = 4096
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Imu
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.bags.writer import LogFile
@@ -15,9 +13,10 @@ from rotorsoil_ros.machine.band import on_soils
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.time_domain import shake, Shaking
 from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.cdr import ARRAYS, IMU, STAMP, SYNTHETIC
+from rotorsoil_ros.wire.cdr import ARRAYS, encode, Layout, NOT_MEASURED, SYNTHETIC
+from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import ROTOR_JOINT
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 GRAVITY = 9.81
 SPEED_RATE_HZ = 50.0
@@ -153,29 +152,18 @@ class Sensor:
     def __init__(self, machine: str, channel: str, acceleration: FloatArray) -> None:
         self._topic = f'/{machine}/measured/{channel}/imu'
         self._acceleration = acceleration
-        frame = f'{SYNTHETIC}_{channel}'
-        self._blank = np.frombuffer(serialize_message(_message(frame)), dtype=np.uint8)
-        marked = _message(frame)
-        marked.linear_acceleration.x = 1.0
-        mark = np.frombuffer(serialize_message(marked), dtype=np.uint8)
-        # Of a double 1.0 the last two bytes are not zero: there its first byte is found.
-        at = int(np.flatnonzero(self._blank != mark)[-1]) - 7
-        self._kind = np.dtype({
-            'names': ['sec', 'nanosec', 'acceleration'], 'formats': ['<i4', '<u4', '(3,)<f8'],
-            'offsets': [STAMP.start, STAMP.start + 4, at], 'itemsize': len(self._blank)})
+        not_measured = [NOT_MEASURED, *[0.0] * 8]
+        blank = encode(IMU, {
+            'header': {'frame_id': f'{SYNTHETIC}_{channel}'},
+            'orientation_covariance': not_measured,
+            'angular_velocity_covariance': not_measured})
+        self._blank = np.frombuffer(blank, dtype=np.uint8)
+        self._kind = Layout.of(IMU, blank).dtype
 
     def records(self, stamp_ns: IntArray, part: slice) -> Records:
         """Return the messages of a part of the run."""
         stamps = stamp_ns[part]
         rows = np.tile(self._blank, (len(stamps), 1)).view(self._kind)[:, 0]
-        rows['sec'], rows['nanosec'] = np.divmod(stamps, NANOSECONDS)
-        rows['acceleration'] = self._acceleration[part]
+        rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, NANOSECONDS)
+        rows['linear_acceleration'] = self._acceleration[part]
         return Records(self._topic, IMU, stamps.tolist(), [row.tobytes() for row in rows])
-
-
-def _message(frame: str) -> Imu:
-    message = Imu()
-    message.header.frame_id = frame
-    message.orientation_covariance[0] = -1.0  # not measured
-    message.angular_velocity_covariance[0] = -1.0
-    return message

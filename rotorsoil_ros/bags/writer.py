@@ -13,8 +13,8 @@ from rotorsoil_ros.bags import metadata as bag_metadata
 from rotorsoil_ros.bags.mcap_writer import McapWriter
 from rotorsoil_ros.bags.metadata import Contents, FileEntry, offered_qos_text, Topic
 from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.wire.definitions import definition, type_hash
 from rotorsoil_ros.wire.messages import Records
-from rotorsoil_ros.wire.topics import definition, type_hash
 
 MEBIBYTE = 1 << 20
 LARGEST_INDEX = 4 * MEBIBYTE  # the index of a file is held in memory until the file is finished

@@ -19,19 +19,9 @@ from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
-from rotorsoil_ros.wire.cdr import IMU
+from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE, LOG, STRING
 from rotorsoil_ros.wire.handlers import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
-from rotorsoil_ros.wire.messages import (
-    Encoder,
-    FLOAT64,
-    JOINT_STATE,
-    LOG,
-    Messenger,
-    OWN_TOPICS,
-    Records,
-    STRING,
-    Topics,
-)
+from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
 
 TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
 RAW_DEPTH = 1000  # samples kept while the node is busy

@@ -22,7 +22,6 @@ from rclpy.lifecycle import (
 )
 from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
-from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
@@ -33,13 +32,8 @@ from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
 from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
-from rotorsoil_ros.wire.messages import (
-    diagnostic_array,
-    DIAGNOSTICS,
-    DIAGNOSTICS_TOPIC,
-    NODE_NAME,
-    Records,
-)
+from rotorsoil_ros.wire.definitions import DIAGNOSTICS
+from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
 
 PERIOD_S = 1.0
 SPIN_S = 0.1  # EventsExecutor dispatches nothing without a timeout; signals wait for it
@@ -189,7 +183,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         """Say on /diagnostics, and so in the log itself, how logging goes."""
         report = log.report(self._now_ns())
         if report is not None and self._diagnostics is not None and self._diagnostics.is_activated:
-            payload = serialize_message(diagnostic_array(report))
+            payload = diagnostic_array(report)
             self._diagnostics.publish(payload)
             log.write(Records(
                 self._diagnostics.topic_name, DIAGNOSTICS, [report.stamp_ns], [payload]))

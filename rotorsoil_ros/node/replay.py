@@ -19,8 +19,7 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import is_input, tells_speed
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.wire.cdr import IMU
-from rotorsoil_ros.wire.messages import FLOAT64, JOINT_STATE
+from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
 
 TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
 DEPTH = 1000

@@ -1,10 +1,12 @@
-"""Where a JointState keeps its stamp and its numbers inside its CDR bytes."""
+"""Where do the fields of a message lie in its CDR bytes? One walk, to read and to write them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import groupby
 import struct
-from typing import Any
+import sys
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +15,32 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.orders import LARGEST_ACCELERATION
+from rotorsoil_ros.wire.definitions import (
+    Compound,
+    compound,
+    IMU,
+    JOINT_STATE,
+    Kind,
+    Number,
+    NUMBERS,
+    Several,
+    Text,
+)
 
 LITTLE_ENDIAN = 1
-BODY = 4  # CDR aligns from the end of its four encapsulation bytes
-STAMP = slice(BODY, BODY + 8)
+OPENING = bytes((0, sys.byteorder == 'little', 0, 0))  # of what is written: in native order
+BODY = len(OPENING)  # CDR aligns from the end of its four encapsulation bytes
+STAMP = slice(BODY, BODY + 8)  # of everything that begins with a header or a stamp
 ARRAYS = ('position', 'velocity', 'effort')
+AXES = ('x', 'y', 'z')
+SYNTHETIC = 'synthetic'  # begins the frame of every signal that no sensor measured
+NOT_MEASURED = -1.0  # in the first covariance
+
+# Before a count, by how many bytes there are: the body begins at a multiple of four.
+ALIGNING = (b'', b'\0\0\0', b'\0\0', b'\0')
+SIZES = {code: struct.calcsize(f'={code}') for code in NUMBERS.values()}
+
+count_bytes = struct.Struct('=I').pack
 
 
 class Cursor:
@@ -59,63 +82,199 @@ class Cursor:
             self.read.append(slice(start, self.at))
 
 
+class _Walk:
+    """Finds the fields of one message: where its numbers are, and what its strings say."""
+
+    def __init__(self, cdr: bytes) -> None:
+        self.cursor = Cursor(cdr)
+        self.texts: dict[str, tuple[str, ...]] = {}
+        self.places: dict[str, tuple[str, int]] = {}
+
+    def find(self, kind: Kind, path: str) -> None:
+        """Step over a field and take down what is in it."""
+        cursor = self.cursor
+        match kind:
+            case Number(code=code):
+                size = SIZES[code]
+                self.places[path] = cursor.order + code, cursor.skip(size, align=size)
+            case Text():
+                self.texts[path] = (cursor.text(),)
+            case Several(of=of, count=count):
+                self._find_several(of, cursor.count() if count is None else count, path)
+            case Compound(fields=fields):
+                codes = {part.code if isinstance(part, Number) else '' for _, part in fields}
+                if len(fields) > 1 and len(codes) == 1 and '' not in codes:  # a vector
+                    self._find_several(fields[0][1], len(fields), path)
+                    return
+                for name, part in fields:
+                    self.find(part, f'{path}.{name}' if path else name)
+
+    def _find_several(self, of: Kind, count: int, path: str) -> None:
+        cursor = self.cursor
+        match of:
+            case Number(code=code):
+                size = SIZES[code]
+                at = cursor.skip(size * count, align=size)
+                self.places[path] = f'({count},){cursor.order}{code}', at
+            case Text():
+                self.texts[path] = tuple([cursor.text() for _ in range(count)])
+            case _:
+                for number in range(count):
+                    self.find(of, f'{path}[{number}]')
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class JointLayout:
+class Layout:
     """
-    Where the numbers of all JointStates lie that differ in nothing but numbers.
+    Where the numbers of all messages lie that differ in nothing but numbers.
 
     Attributes
     ----------
-    names : tuple of str
-        Joints.
+    texts : mapping of tuples of str
+        What the strings say, by path: `name`, `header.frame_id`, `status[0].message`.
     size : int
         Length of the message [bytes].
     fixed : tuple of (slice, bytes)
-        What such messages share: names and counts, but not the padding, which is not zeroed.
+        What such messages share: strings and counts, but not the padding, which is not zeroed.
     order : str
         Byte order, < or >.
     dtype : numpy structured type
-        Fields sec, nanosec, position, velocity and effort laid over the bytes.
+        Numbers by path, laid over the bytes; vectors and arrays as arrays.
 
     """
 
-    names: tuple[str, ...]
+    texts: Mapping[str, tuple[str, ...]]
     size: int
     fixed: tuple[tuple[slice, bytes], ...]
     order: str
     dtype: np.dtype[Any]
 
     @classmethod
-    def of(cls, cdr: bytes) -> 'JointLayout':
-        """Read the layout of one message; raise InputError where it is not a JointState."""
-        cursor = Cursor(cdr)
-        cursor.skip(STAMP.stop - STAMP.start)
-        cursor.text()
-        names = tuple([cursor.text() for _ in range(cursor.count())])
-        fields = {'sec': (f'{cursor.order}i4', STAMP.start),
-                  'nanosec': (f'{cursor.order}u4', STAMP.start + 4)}
-        for name in ARRAYS:
-            length = cursor.count()
-            fields[name] = (f'({length},){cursor.order}f8', cursor.skip(8 * length, align=8))
-        dtype = np.dtype({
-            'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
-            'offsets': [offset for _, offset in fields.values()], 'itemsize': len(cdr)})
-        fixed = tuple((at, cdr[at]) for at in cursor.read)
-        return cls(names, len(cdr), fixed, cursor.order, dtype)
+    def of(cls, message_type: str, cdr: bytes) -> 'Layout':
+        """Read the layout of one message; raise InputError where it is not of its type."""
+        walk = _Walk(cdr)
+        walk.find(compound(message_type), '')
+        kinds, offsets = zip(*walk.places.values(), strict=True) if walk.places else ((), ())
+        dtype = np.dtype({'names': list(walk.places), 'formats': list(kinds),
+                          'offsets': list(offsets), 'itemsize': len(cdr)})
+        fixed = tuple((at, cdr[at]) for at in walk.cursor.read)
+        return cls(walk.texts, len(cdr), fixed, walk.cursor.order, dtype)
 
     def fits(self, cdr: bytes) -> bool:
         """Return whether a message differs from this layout in nothing but its numbers."""
-        return len(cdr) == self.size and all([cdr[at] == shared for at, shared in self.fixed])
+        if len(cdr) != self.size:
+            return False
+        for at, shared in self.fixed:  # noqa: SIM110 - a generator costs half a microsecond
+            if cdr[at] != shared:
+                return False
+        return True
 
     def stamp_ns(self, cdr: bytes) -> int:
-        """Return the stamp of one message [ns]."""
+        """Return the stamp of one message, which begins with it [ns]."""
         sec, nanosec = struct.unpack_from(self.order + 'iI', cdr, STAMP.start)
         return int(sec * NANOSECONDS + nanosec)
 
-    def span(self, name: str) -> slice:
-        """Return the bytes of one of the three arrays."""
-        kind, offset = self.dtype.fields[name][:2]  # type: ignore[index]
+    def span(self, path: str) -> slice:
+        """Return the bytes of a number, a vector or an array."""
+        kind, offset = self.dtype.fields[path][:2]  # type: ignore[index]
         return slice(offset, offset + kind.itemsize)
+
+    def rows(self, cdrs: Sequence[bytes]) -> np.ndarray:
+        """Lay the type over n messages that all fit."""
+        return np.frombuffer(b''.join(cdrs), dtype=self.dtype)
+
+
+def encode(message_type: str, values: Mapping[str, Any]) -> bytes:
+    """
+    Write one message; what is not given is as in a new one: zero, empty, or its default.
+
+    Parameters
+    ----------
+    message_type : str
+        One of those that are defined.
+    values : mapping
+        By field: numbers, strings, sequences, and mappings of messages within the message.
+
+    """
+    out = bytearray(OPENING)
+    _put(compound(message_type))(values, out)
+    return bytes(out)
+
+
+@cache
+def _put(kind: Kind) -> Callable[[Any, bytearray], None]:
+    """Return what appends a value of some kind to the bytes of a message."""
+    match kind:
+        case Number():
+            put = _put_numbers(kind)
+            return lambda value, out: put((value,), out)
+        case Text():
+            return _put_text
+        case Several(of=of, count=count):
+            return _put_several(of, count)
+        case Compound(fields=fields):
+            return _put_compound(fields)
+
+
+def _put_text(value: str, out: bytearray) -> None:
+    text = value.encode()
+    out += ALIGNING[len(out) % 4] + count_bytes(len(text) + 1) + text + b'\0'
+
+
+def _put_numbers(number: Number) -> Callable[[Sequence[float], bytearray], None]:
+    code, size = number.code, SIZES[number.code]
+
+    def put(values: Sequence[float], out: bytearray) -> None:
+        if len(values):  # of nothing Fast CDR does not even write the padding
+            out += bytes((BODY - len(out)) % size)
+            out += struct.pack(f'={len(values)}{code}', *values)
+    return put
+
+
+def _put_several(of: Kind, count: int | None) -> Callable[[Any, bytearray], None]:
+    put_all = _put_numbers(of) if isinstance(of, Number) else _put_each(_put(of))
+
+    def put_several(values: Any, out: bytearray) -> None:
+        if count is None:
+            out += ALIGNING[len(out) % 4] + count_bytes(len(values))
+        elif len(values) != count:
+            raise ValueError(f'needs {count} values, got {len(values)}')
+        put_all(values, out)
+    return put_several
+
+
+def _put_each(put: Callable[[Any, bytearray], None]) -> Callable[[Sequence[Any], bytearray], None]:
+    def put_each(values: Sequence[Any], out: bytearray) -> None:
+        for value in values:
+            put(value, out)
+    return put_each
+
+
+def _put_compound(
+    fields: tuple[tuple[str, Kind], ...],
+) -> Callable[[Mapping[str, Any], bytearray], None]:
+    parts = [(name, _put(kind), _new(kind)) for name, kind in fields]
+    names = frozenset(name for name, _ in fields)
+
+    def put_compound(values: Mapping[str, Any], out: bytearray) -> None:
+        if not values.keys() <= names:
+            raise ValueError(f'has the fields {", ".join(names)}, got {", ".join(values)}')
+        for name, put, new in parts:
+            put(values.get(name, new), out)
+    return put_compound
+
+
+def _new(kind: Kind) -> Any:
+    """Return what a field is when nobody says."""
+    match kind:
+        case Number(default=default):
+            return default
+        case Text():
+            return ''
+        case Several(of=of, count=count):
+            return [_new(of)] * (count or 0)
+        case Compound():
+            return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,34 +288,78 @@ class JointStates:
     effort: FloatArray
 
 
-def decode(layout: JointLayout, cdrs: Sequence[bytes]) -> JointStates:
-    """Decode n messages that all fit one layout; arrays are (n, names)."""
-    rows = np.frombuffer(b''.join(cdrs), dtype=layout.dtype)
-    stamp_ns = rows['sec'].astype(np.int64) * NANOSECONDS + rows['nanosec']
-    width = len(layout.names)
-    return JointStates(layout.names, stamp_ns, *(_full(rows[name], width) for name in ARRAYS))
+@dataclass(frozen=True, slots=True)
+class Accelerations:
+    """Stamps (n,) [ns] and accelerations (n, 3) [m/s^2], NaN where the sensor has none."""
+
+    stamp_ns: IntArray
+    acceleration: FloatArray
+    is_synthetic: bool
 
 
-class JointStateReader:
-    """Decode JointStates as they come: one publisher keeps its layout, so it is read once."""
+Decoded = TypeVar('Decoded')
 
-    def __init__(self) -> None:
-        self._layout: JointLayout | None = None
 
-    def runs(self, cdrs: Sequence[bytes]) -> Iterator[tuple[list[bytes], JointStates | None]]:
+class _Reader(Generic[Decoded]):
+    """Decodes messages as they come: one publisher keeps its layout, so that it is read once."""
+
+    def __init__(
+        self, message_type: str, decode: Callable[[Layout, Sequence[bytes]], Decoded],
+    ) -> None:
+        self._type, self._decode = message_type, decode
+        self._layout: Layout | None = None
+
+    def runs(self, cdrs: Sequence[bytes]) -> Iterator[tuple[list[bytes], Decoded | None]]:
         """Split messages into runs of one layout, decoded; None where they are malformed."""
         for layout, run in groupby(cdrs, key=self.layout):
             messages = list(run)
-            yield messages, decode(layout, messages) if layout else None
+            yield messages, self._decode(layout, messages) if layout else None
 
-    def layout(self, cdr: bytes) -> JointLayout | None:
+    def layout(self, cdr: bytes) -> Layout | None:
         """Return the layout of a message, the same object for the same layout."""
         if self._layout is None or not self._layout.fits(cdr):
             try:
-                self._layout = JointLayout.of(cdr)
+                self._layout = Layout.of(self._type, cdr)
             except InputError:
                 self._layout = None
         return self._layout
+
+
+class JointStateReader(_Reader[JointStates]):
+    """Decodes JointStates."""
+
+    def __init__(self) -> None:
+        super().__init__(JOINT_STATE, joint_states)
+
+
+class ImuReader(_Reader[Accelerations]):
+    """Decodes samples of accelerometers."""
+
+    def __init__(self) -> None:
+        super().__init__(IMU, accelerations)
+
+
+def joint_states(layout: Layout, cdrs: Sequence[bytes]) -> JointStates:
+    """Decode n messages that all fit one layout; arrays are (n, names)."""
+    rows, names = layout.rows(cdrs), layout.texts['name']
+    return JointStates(names, _stamps(rows), *(
+        _full(rows[array], len(names)) for array in ARRAYS))
+
+
+def accelerations(layout: Layout, cdrs: Sequence[bytes]) -> Accelerations:
+    """Decode n samples that all fit one layout."""
+    rows = layout.rows(cdrs)
+    acceleration = rows['linear_acceleration'].astype(float)
+    acceleration[rows['linear_acceleration_covariance'][:, 0] == NOT_MEASURED] = np.nan
+    acceleration[np.abs(acceleration) > LARGEST_ACCELERATION] = np.nan
+    return Accelerations(_stamps(rows), acceleration,
+                         layout.texts['header.frame_id'][0].startswith(SYNTHETIC))
+
+
+def _stamps(rows: np.ndarray) -> IntArray:
+    """Return the stamps (n,) of stamped messages [ns]."""
+    seconds = rows['header.stamp.sec'].astype(np.int64)
+    return np.asarray(seconds * NANOSECONDS + rows['header.stamp.nanosec'])
 
 
 def _full(values: npt.NDArray[Any], width: int) -> FloatArray:
@@ -167,84 +370,3 @@ def _full(values: npt.NDArray[Any], width: int) -> FloatArray:
     given = min(width, values.shape[1])
     full[:, :given] = values[:, :given]
     return full
-
-
-IMU = 'sensor_msgs/msg/Imu'
-SYNTHETIC = 'synthetic'  # begins the frame of every signal that no sensor measured
-AXES = ('x', 'y', 'z')
-
-# Doubles of an Imu before its linear acceleration: orientation and angular velocity, each with
-# the covariance.
-_BEFORE_ACCELERATION = 4 + 9 + 3 + 9
-
-_NOT_MEASURED = -1.0  # in the first covariance
-
-
-@dataclass(frozen=True, slots=True)
-class Accelerations:
-    """Stamps (n,) [ns] and accelerations (n, 3) [m/s^2], NaN where the sensor has none."""
-
-    stamp_ns: IntArray
-    acceleration: FloatArray
-    is_synthetic: bool
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Layout:
-    """Where the numbers lie in all messages of one sensor: they differ in nothing else."""
-
-    opening: bytes
-    frame: slice
-    frame_id: bytes
-    dtype: np.dtype[Any]
-    is_synthetic: bool
-
-    @classmethod
-    def of(cls, cdr: bytes) -> '_Layout':
-        cursor = Cursor(cdr)
-        cursor.skip(STAMP.stop - STAMP.start)
-        text = cursor.text()
-        frame = slice(STAMP.stop, cursor.at)
-        cursor.skip(8 * _BEFORE_ACCELERATION, align=8)
-        at = cursor.skip(8 * len(AXES), align=8)
-        covariance = cursor.skip(8, align=8)
-        order = cursor.order
-        dtype = np.dtype({
-            'names': ['sec', 'nanosec', 'acceleration', 'covariance'],
-            'formats': [f'{order}i4', f'{order}u4', f'(3,){order}f8', f'{order}f8'],
-            'offsets': [STAMP.start, STAMP.start + 4, at, covariance], 'itemsize': len(cdr)})
-        return cls(cdr[:2], frame, cdr[frame], dtype, text.startswith(SYNTHETIC))
-
-    def fits(self, cdr: bytes) -> bool:
-        return (len(cdr) == self.dtype.itemsize and cdr[:2] == self.opening
-                and cdr[self.frame] == self.frame_id)
-
-
-class ImuReader:
-    """Decodes the samples of one topic as they come."""
-
-    def __init__(self) -> None:
-        self._layout: _Layout | None = None
-
-    def runs(self, cdrs: Sequence[bytes]) -> Iterator[tuple[list[bytes], Accelerations | None]]:
-        """Split messages into runs of one sensor, decoded; None where they are malformed."""
-        for layout, run in groupby(cdrs, key=self._layout_of):
-            messages = list(run)
-            yield messages, _decode(layout, messages) if layout else None
-
-    def _layout_of(self, cdr: bytes) -> _Layout | None:
-        if self._layout is None or not self._layout.fits(cdr):
-            try:
-                self._layout = _Layout.of(cdr)
-            except InputError:
-                self._layout = None
-        return self._layout
-
-
-def _decode(layout: _Layout, cdrs: Sequence[bytes]) -> Accelerations:
-    rows = np.frombuffer(b''.join(cdrs), dtype=layout.dtype)
-    acceleration = rows['acceleration'].astype(float)
-    acceleration[rows['covariance'] == _NOT_MEASURED] = np.nan
-    acceleration[np.abs(acceleration) > LARGEST_ACCELERATION] = np.nan
-    return Accelerations(rows['sec'].astype(np.int64) * NANOSECONDS + rows['nanosec'],
-                         acceleration, layout.is_synthetic)

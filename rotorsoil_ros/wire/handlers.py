@@ -12,16 +12,9 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import LAST_STAMP, Measured, Samples
 from rotorsoil_ros.monitor.monitor import Monitor
-from rotorsoil_ros.wire.cdr import (
-    AXES,
-    BODY,
-    IMU,
-    ImuReader,
-    JointLayout,
-    JointStateReader,
-    LITTLE_ENDIAN,
-)
-from rotorsoil_ros.wire.messages import FLOAT64, JOINT_STATE, Records
+from rotorsoil_ros.wire.cdr import AXES, BODY, ImuReader, JointStateReader, Layout, LITTLE_ENDIAN
+from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
+from rotorsoil_ros.wire.messages import Records
 
 SPEED_TOPICS = {'joint_states': JOINT_STATE, 'rotor/speed': FLOAT64}
 MEASURED_TOPICS = {'measured/amplitude': JOINT_STATE, 'measured/phase': JOINT_STATE}
@@ -93,7 +86,7 @@ class JointSpeed:
     def __init__(self, joint: str) -> None:
         self._joint = joint
         self._reader = JointStateReader()
-        self._layout: JointLayout | None = None
+        self._layout: Layout | None = None
         self._fault = ''
         self._unpack = struct.Struct('<d').unpack_from
         self._at = self._angle_at = 0
@@ -113,15 +106,15 @@ class JointSpeed:
         speed = math.nan if self._fault else self._unpack(cdr, self._at)[0]
         return stamp, speed, angle, self._fault
 
-    def _learn(self, layout: JointLayout | None) -> None:
+    def _learn(self, layout: Layout | None) -> None:
         """Find out where in such messages the velocity is, or why it is not there."""
         self._layout = layout
         if layout is None:
             self._fault = 'malformed'
-        elif self._joint not in layout.names:
+        elif self._joint not in layout.texts['name']:
             self._fault = 'joint_missing'
         else:
-            velocities, number = layout.span('velocity'), layout.names.index(self._joint)
+            velocities, number = layout.span('velocity'), layout.texts['name'].index(self._joint)
             self._at = velocities.start + 8 * number
             self._fault = '' if self._at < velocities.stop else 'velocity_missing'
             angles = layout.span('position')

@@ -3,15 +3,11 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
+import math
 import struct
 from typing import NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
-from rcl_interfaces.msg import Log
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.events import (
@@ -27,15 +23,11 @@ from rotorsoil_ros.events import (
     Remark,
 )
 from rotorsoil_ros.prediction import Prediction
-from rotorsoil_ros.wire.cdr import ARRAYS, JointLayout, STAMP
+from rotorsoil_ros.wire.cdr import ARRAYS, encode, Layout, STAMP
+from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, LOG, STRING
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
-FLOAT64 = 'std_msgs/msg/Float64'
-STRING = 'std_msgs/msg/String'
-DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 DIAGNOSTICS_TOPIC = '/diagnostics'
 NODE_NAME = 'rotorsoil'
-LOG = 'rcl_interfaces/msg/Log'
 MOST_LAYOUTS = 64  # sets of channels that are measured together; more than that nobody means
 
 # Topics of a machine below the node's name, and their types.
@@ -45,10 +37,11 @@ OWN_TOPICS = {
     'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
     'model': STRING}
 
-SEVERITY = {Level.OK: Log.INFO, Level.WARN: Log.WARN, Level.ERROR: Log.ERROR,
-            Level.STALE: Log.WARN}
+# Of rcl_interfaces/msg/Log.
+INFO, WARNING, FAILURE = 20, 30, 40
+SEVERITY = {Level.OK: INFO, Level.WARN: WARNING, Level.ERROR: FAILURE, Level.STALE: WARNING}
 
-pack_stamp = struct.Struct('=iI').pack  # in the order of this machine, as rclpy does
+pack_stamp = struct.Struct('=iI').pack  # in the order of this machine, as `encode` does
 
 
 class Records(NamedTuple):
@@ -109,22 +102,18 @@ class JointStateWriter:
     """
     Fill JointStates of constant names, n at a time.
 
-    The names never change, so rclpy serializes one message, once, and only the numbers between
-    its constant bytes are replaced: the same message at a tenth of the cost.
+    The names never change, so one message is encoded, once, and only the numbers between its
+    constant bytes are replaced: the same message at a tenth of the cost.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        blank = [float('nan')] * len(names)
-        template = serialize_message(
-            JointState(name=list(names), position=blank, velocity=blank, effort=blank))
-        layout = JointLayout.of(template)
-        clean = bytearray(layout.size)  # rclpy leaves chance bytes in the padding: not in ours
-        for at, shared in layout.fixed:
-            clean[at] = shared
+        blank = [math.nan] * len(names)
+        template = encode(JOINT_STATE, {'name': names, **dict.fromkeys(ARRAYS, blank)})
+        layout = Layout.of(JOINT_STATE, template)
         arrays = [layout.span(name) for name in ARRAYS]
         starts = [at.start for at in (STAMP, *arrays)] + [layout.size]
         stops = [0] + [at.stop for at in (STAMP, *arrays)]
-        self._between = [bytes(clean[stop:start])
+        self._between = [template[stop:start]
                          for stop, start in zip(stops, starts, strict=True)]
         self._width = 8 * len(names)
 
@@ -169,14 +158,13 @@ class Encoder:
                                    speed[:, None] * residual)
             case Demodulated():
                 yield from self._demodulated(event)
-            case Remark(stamp_ns=stamp_ns):
-                payload = serialize_message(log_message(event))
-                yield Records(self._topics.events, LOG, [stamp_ns], [payload])
-            case Diagnostics(stamp_ns=stamp_ns):
-                payload = serialize_message(diagnostic_array(event))
-                yield Records(self._topics.diagnostics, DIAGNOSTICS, [stamp_ns], [payload])
+            case Remark():
+                yield Records(self._topics.events, LOG, [event.stamp_ns], [log_message(event)])
+            case Diagnostics():
+                yield Records(self._topics.diagnostics, DIAGNOSTICS, [event.stamp_ns],
+                              [diagnostic_array(event)])
             case Model(stamp_ns=stamp_ns):
-                payload = serialize_message(String(data=json.dumps(event.description)))
+                payload = encode(STRING, {'data': json.dumps(event.description)})
                 yield Records(self._topics.model, STRING, [stamp_ns], [payload], latched=True)
 
     def _predicted(self, event: Predicted) -> Iterator[Records]:
@@ -220,27 +208,30 @@ class Encoder:
         return Records(topic, JOINT_STATE, stamps, writer.write_parts(stamps, outer, velocity))
 
 
-def log_message(event: Remark) -> Log:
-    """Map a remark to the message of every ROS log."""
-    message = Log(level=SEVERITY[event.level], name=f'{NODE_NAME}.{event.machine}',
-                  msg=event.text)
-    message.stamp.sec, message.stamp.nanosec = divmod(event.stamp_ns, NANOSECONDS)
-    return message
+def log_message(event: Remark) -> bytes:
+    """Return a remark as the message of every ROS log."""
+    return encode(LOG, {
+        'stamp': _time(event.stamp_ns), 'level': SEVERITY[event.level],
+        'name': f'{NODE_NAME}.{event.machine}', 'msg': event.text})
 
 
-def diagnostic_array(event: Diagnostics) -> DiagnosticArray:
-    """Map the health of a machine to the message that every ROS monitor reads."""
-    message = DiagnosticArray()
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(event.stamp_ns, NANOSECONDS)
-    message.status = [_status(each) for each in (event, *event.parts)]
-    return message
+def diagnostic_array(event: Diagnostics) -> bytes:
+    """Return the health of a machine as the message that every ROS monitor reads."""
+    return encode(DIAGNOSTICS, {
+        'header': {'stamp': _time(event.stamp_ns)},
+        'status': [_status(each) for each in (event, *event.parts)]})
 
 
-def _status(event: Diagnostics) -> DiagnosticStatus:
-    name = f'{NODE_NAME}: {event.machine} {event.name}'.rstrip()
-    return DiagnosticStatus(
-        level=bytes([event.level]), name=name, hardware_id=event.machine, message=event.summary,
-        values=[KeyValue(key=key, value=decimal(value)) for key, value in event.values.items()])
+def _time(stamp_ns: int) -> dict[str, int]:
+    sec, nanosec = divmod(stamp_ns, NANOSECONDS)
+    return {'sec': sec, 'nanosec': nanosec}
+
+
+def _status(event: Diagnostics) -> dict[str, object]:
+    return {
+        'level': event.level, 'name': f'{NODE_NAME}: {event.machine} {event.name}'.rstrip(),
+        'message': event.summary, 'hardware_id': event.machine,
+        'values': [{'key': key, 'value': decimal(value)} for key, value in event.values.items()]}
 
 
 def decimal(value: float | str) -> str:

@@ -21,13 +21,14 @@ import yaml
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.writer import BagWriter, LogFile, new_directory
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.messages import (
+from rotorsoil_ros.wire.definitions import (
+    definition,
     DIAGNOSTICS,
     FLOAT64,
     JOINT_STATE,
     STRING,
+    type_hash,
 )
-from rotorsoil_ros.wire.topics import definition, type_hash
 
 from records import (
     float_records,

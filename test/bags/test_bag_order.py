@@ -6,7 +6,8 @@ import pytest
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.writer import LogFile
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 START = 1_700_000_000 * 10**9
 

@@ -17,8 +17,9 @@ from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.loading import Machine
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.cdr import decode, JointLayout
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+from rotorsoil_ros.wire.cdr import joint_states, Layout
+from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 FAN = Path('config/plant_fan.yaml')
 START = 1_700_000_000_000_000_001
@@ -33,7 +34,7 @@ def profile_of(path, machine, speeds, *, start=START):
 def logged(path, topic):
     payloads = [payload for source, _, payload in bag_reader.messages(path, lambda *_: True)
                 if source.topic == topic]
-    return decode(JointLayout.of(payloads[0]), payloads)
+    return joint_states(Layout.of(JOINT_STATE, payloads[0]), payloads)
 
 
 def payloads(path, topic):

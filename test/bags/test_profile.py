@@ -19,8 +19,8 @@ from rotorsoil_ros.bags.profile import (
 )
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.cdr import decode, JointLayout
-from rotorsoil_ros.wire.messages import FLOAT64, JOINT_STATE, STRING
+from rotorsoil_ros.wire.cdr import joint_states, Layout
+from rotorsoil_ros.wire.definitions import FLOAT64, JOINT_STATE, STRING
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 START = 1_700_000_000_000_000_001
@@ -124,7 +124,7 @@ rpm,amp_1x_um,phase_1x_deg
 def measured(path, topic):
     payloads = [payload for source, _, payload in bag_reader.messages(path, lambda *_: True)
                 if source.topic == topic]
-    return decode(JointLayout.of(payloads[0]), payloads)
+    return joint_states(Layout.of(JOINT_STATE, payloads[0]), payloads)
 
 
 def test_a_run_up_gets_the_time_of_its_revolutions(tmp_path):

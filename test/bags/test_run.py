@@ -11,8 +11,8 @@ from std_msgs.msg import String
 from rotorsoil_ros.bags.run import read_run, Reading
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.cdr import IMU
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records, STRING
+from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE, STRING
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 SECOND = 1_000_000_000
 STAMPS = SECOND * np.array([10, 11, 12])

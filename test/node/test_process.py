@@ -7,7 +7,7 @@ import pytest
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.messages import JOINT_STATE
+from rotorsoil_ros.wire.definitions import JOINT_STATE
 
 from graphs import speak
 

@@ -21,7 +21,8 @@ from rotorsoil_ros.case.loading import Machine
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.node.node import RotorsoilNode
 from rotorsoil_ros.node.replay import replay
-from rotorsoil_ros.wire.messages import JOINT_STATE, JointStateWriter, Records
+from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 FAN = Path('config/plant_fan.yaml')
 START = 1_700_000_000_000_000_001

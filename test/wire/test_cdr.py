@@ -8,7 +8,8 @@ from rosbags.typesys import get_typestore, Stores
 from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.cdr import decode, JointLayout, JointStateReader
+from rotorsoil_ros.wire.cdr import joint_states as decode, JointStateReader, Layout
+from rotorsoil_ros.wire.definitions import JOINT_STATE
 
 NUMBERS = some.floats(allow_nan=False)
 WORDS = some.text(some.characters(codec='ascii', exclude_characters='\0'), max_size=9)
@@ -41,7 +42,7 @@ def assert_says(states, message):
 @given(joint_states())
 def test_every_joint_state_that_rclpy_writes_is_read(message):
     cdr = serialize_message(message)
-    assert_says(decode(JointLayout.of(cdr), [cdr]), message)
+    assert_says(decode(Layout.of(JOINT_STATE, cdr), [cdr]), message)
 
 
 @given(joint_states())
@@ -55,7 +56,7 @@ def test_big_endian_messages_of_another_implementation_are_read(message):
         message.name, np.array(message.position), np.array(message.velocity),
         np.array(message.effort))
     cdr = bytes(store.serialize_cdr(foreign, 'sensor_msgs/msg/JointState', little_endian=False))
-    layout = JointLayout.of(cdr)
+    layout = Layout.of(JOINT_STATE, cdr)
     assert layout.order == '>'
     assert_says(decode(layout, [cdr]), message)
     assert layout.stamp_ns(cdr) == header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
@@ -67,7 +68,7 @@ def message_of(names, velocity, **others):
 
 def test_padding_does_not_make_a_layout_different():
     cdr = bytearray(message_of(['rotor'], [1.0]))
-    layout = JointLayout.of(bytes(cdr))
+    layout = Layout.of(JOINT_STATE, bytes(cdr))
     padding = set(range(len(cdr))) - {index for at, _ in layout.fixed
                                       for index in range(at.start, at.stop)}
     padding -= {*range(4, 12), *range(layout.span('velocity').start, layout.span('velocity').stop)}
@@ -82,13 +83,13 @@ def test_padding_does_not_make_a_layout_different():
     message_of(['rotor'], [1.0], position=[2.0]), message_of(['rotor'], []),
     message_of(['rotor'], [], position=[1.0]), message_of(['rotor'], [1.0]) + bytes(8)])
 def test_other_names_and_other_counts_are_another_layout(other):
-    assert not JointLayout.of(message_of(['rotor'], [1.0])).fits(other)
+    assert not Layout.of(JOINT_STATE, message_of(['rotor'], [1.0])).fits(other)
 
 
 @given(some.binary(max_size=80))
 def test_bytes_of_a_stranger_are_read_or_refused(noise):
     try:
-        JointLayout.of(b'\0\1\0\0' + noise)
+        Layout.of(JOINT_STATE, b'\0\1\0\0' + noise)
     except InputError:
         return
 
@@ -97,7 +98,7 @@ def test_bytes_of_a_stranger_are_read_or_refused(noise):
 def test_a_message_that_was_cut_off_is_refused(length):
     cdr = message_of(['rotor', 'b'], [1.0, 2.0], position=[1.0, 2.0], effort=[1.0, 2.0])
     with pytest.raises(InputError, match='message'):
-        JointLayout.of(cdr[:length])
+        Layout.of(JOINT_STATE, cdr[:length])
 
 
 def test_runs_keep_the_order_and_set_the_malformed_apart():

@@ -3,6 +3,7 @@
 import json
 import math
 
+from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -122,7 +123,7 @@ def test_a_measurement_needs_no_message_because_it_came_as_one():
 def test_diagnostics_are_plain_decimals_with_a_level_of_one_byte():
     told = Diagnostics('fan', STAMP, Level.STALE, 'no speed', {
         'received': 12_000_000, 'rate_hz': 1e-7, 'speed_rad_s': 1e17, 'silent_s': math.nan})
-    message = diagnostic_array(told)
+    message = deserialize_message(diagnostic_array(told), DiagnosticArray)
     status = message.status[0]
     assert status.level == b'\x03'
     assert (status.hardware_id, status.message) == ('fan', 'no speed')

@@ -1,0 +1,59 @@
+"""Everything offline runs where neither rclpy nor a message package is installed."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+from test_architecture import ROS
+
+from rotorsoil_ros.bags.profile import import_run_up
+
+ROOT = Path(__file__).parents[1]
+RUN_UP = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
+ROTOR_KIT = ROOT / 'config' / 'rk4_rotor_kit.yaml'
+
+
+@pytest.fixture
+def without_ros(tmp_path, cache):
+    """Return what runs a verb where no package of ROS can be imported, nor by its children."""
+    blocked = tmp_path / 'blocked'
+    blocked.mkdir()
+    (blocked / 'sitecustomize.py').write_text(
+        f'import sys\nsys.modules.update(dict.fromkeys({sorted(ROS)}))\n')
+    path = os.pathsep.join([str(blocked), *filter(None, [os.environ.get('PYTHONPATH')])])
+    environment = {**os.environ, 'PYTHONPATH': path, 'ROTORSOIL_CACHE': str(cache)}
+
+    def run(*arguments):
+        return subprocess.run(
+            [sys.executable, *map(str, arguments)], cwd=tmp_path, env=environment,
+            capture_output=True, text=True)
+    assert run('-c', 'import rclpy').returncode != 0
+    return run
+
+
+def test_offline_verbs_need_no_ros(without_ros, tmp_path):
+    import_run_up(RUN_UP, tmp_path / 'profile.mcap', machine='rk4_rotor_kit',
+                  channel='probe_1_x', start_ns=1_700_000_000_000_000_000)
+    for arguments in (
+            ['check', ROTOR_KIT],
+            ['response', ROTOR_KIT, '--rpm', '800:1200:5', '-o', 'response.csv'],
+            ['predict', ROTOR_KIT, 'profile.mcap', '-o', 'log.mcap'],
+            ['compare', 'log.mcap', ROTOR_KIT, '-o', 'compared']):
+        done = without_ros('-m', 'rotorsoil_ros.cli', *arguments)
+        # The kit is not what its nominal bearings say: the verdict of `compare` is 1.
+        assert done.returncode == (arguments[0] == 'compare'), done.stderr
+        assert 'Traceback' not in done.stderr
+    log = (tmp_path / 'log.mcap').read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(log[:len(log) * 3 // 4])
+    done = without_ros('-m', 'rotorsoil_ros.cli', 'recover', 'cut.mcap', '-o', 'saved.mcap')
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / 'saved.mcap').exists()
+
+
+def test_wire_and_bags_are_imported_without_ros(without_ros):
+    rooms = ('wire.messages', 'wire.handlers', 'bags.recorder', 'bags.run', 'bags.predict',
+             'bags.synthetic', 'bags.retention')
+    done = without_ros('-c', f'for room in {rooms}: __import__(f"rotorsoil_ros.{{room}}")')
+    assert done.returncode == 0, done.stderr
