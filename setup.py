@@ -46,15 +46,18 @@ setup(
         'zstandard>=0.20',
     ],
     extras_require={
+        'frames': ['pandas>=2.0', 'xarray>=2023.6'],
         'viewer': ['rerun-sdk>=0.38'],
         'test': [
             'cyclonedds>=11.0; sys_platform == "linux" and platform_machine == "x86_64"',
             'hypothesis>=6.100',
             'mypy>=1.10',
+            'pandas>=2.0',
             'pytest>=8.2',
             'rosbags>=0.11.0',
             'ruff>=0.6',
             'types-PyYAML',
+            'xarray>=2023.6',
         ],
     },
     entry_points={

@@ -17,7 +17,7 @@ import numpy as np
 
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import write_speed_profile
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.machine.band import ResponseBand, SoilSpread
 

@@ -21,7 +21,10 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import campbell, critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Rotor, ShaftSection
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, ShaftSection
 
 from oracles.dense import dense_response
 

@@ -23,7 +23,7 @@ import time
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor

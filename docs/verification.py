@@ -35,7 +35,9 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import campbell, critical_speeds
 from rotorsoil_ros.rotor import beam
-from rotorsoil_ros.rotor.assembly import Disc, Material, Rotor, ShaftSection
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, ShaftSection
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rpm_to_rad_s
 
 import machines

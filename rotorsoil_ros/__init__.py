@@ -1,5 +1,14 @@
 """
-What a rotor on real soil should vibrate like, as a ROS 2 node.
+What a rotor on real soil should vibrate like: an engine, and a ROS 2 node.
+
+    import rotorsoil_ros as rs
+
+    machine = rs.load('plant_fan.yaml')
+    run = machine.response(rpm=range(300, 1800, 5))
+    run['drive_end_housing_x'].velocity_mm_s_rms()
+
+The names of `__all__` are public; each is imported when it is first asked for, so that a
+program pays only for what it uses.
 
 Conventions
 -----------
@@ -10,4 +19,74 @@ A rotor node has the degrees of freedom (x, z, rx, rz); a block and its contact 
 Inside the package everything is SI and rad/s; names of user-facing keys say their unit.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.bags.profile import read_profile
+    from rotorsoil_ros.case.machine import load, Machine
+    from rotorsoil_ros.channel import Channel
+    from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
+    from rotorsoil_ros.events import Profile
+    from rotorsoil_ros.ground.cone import ConeModel
+    from rotorsoil_ros.ground.half_space import InfiniteElementModel
+    from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil, Soil, SoilModel
+    from rotorsoil_ros.ground.table import ComplianceTable
+    from rotorsoil_ros.machine.band import SoilSpread
+    from rotorsoil_ros.machine.coupled import CoupledModel
+    from rotorsoil_ros.machine.foundation import Foundation
+    from rotorsoil_ros.machine.modes import Campbell, CriticalSpeed
+    from rotorsoil_ros.machine.response import Predictor, ResponseTable
+    from rotorsoil_ros.prediction import Bounds, Prediction, Response
+    from rotorsoil_ros.rotor.assembly import Rotor
+    from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
+    from rotorsoil_ros.rotor.disc import Disc
+    from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
+
 __version__ = '0.1.0'
+__all__ = [
+    'Bearing', 'Bounds', 'Campbell', 'Channel', 'Circle', 'ComplianceTable', 'ConeModel',
+    'CoupledModel', 'CriticalSpeed', 'Disc', 'Foundation', 'InfiniteElementModel', 'InputError',
+    'Machine', 'Material', 'NotSolvedError', 'OutOfTableError', 'Pedestal', 'Prediction',
+    'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil',
+    'Rotor', 'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel', 'SoilSpread', 'load',
+    'read_profile',
+]
+
+# Which room a public name lives in.
+_ROOMS = {
+    'bags.profile': ('read_profile',),
+    'case.machine': ('Machine', 'load'),
+    'channel': ('Channel',),
+    'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
+    'events': ('Profile',),
+    'ground.cone': ('ConeModel',),
+    'ground.half_space': ('InfiniteElementModel',),
+    'ground.soil': ('Circle', 'Rectangle', 'RigidSoil', 'Soil', 'SoilModel'),
+    'ground.table': ('ComplianceTable',),
+    'machine.band': ('SoilSpread',),
+    'machine.coupled': ('CoupledModel',),
+    'machine.foundation': ('Foundation',),
+    'machine.modes': ('Campbell', 'CriticalSpeed'),
+    'machine.response': ('Predictor', 'ResponseTable'),
+    'prediction': ('Bounds', 'Prediction', 'Response'),
+    'rotor.assembly': ('Rotor',),
+    'rotor.bearing': ('Bearing', 'Pedestal'),
+    'rotor.disc': ('Disc',),
+    'rotor.shaft': ('Material', 'Probe', 'ShaftSection'),
+}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    """Import what a public name stands for (PEP 562)."""
+    if name not in _ROOM_OF:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    found = getattr(import_module(f'{__name__}.{_ROOM_OF[name]}'), name)
+    globals()[name] = found  # asked once
+    return found
+
+
+def __dir__() -> list[str]:
+    """Return the public names, imported or not."""
+    return sorted({*globals(), *__all__})

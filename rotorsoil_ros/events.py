@@ -10,6 +10,7 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.prediction import Prediction
+from rotorsoil_ros.units import rad_s_to_rpm
 
 NANOSECONDS = 1_000_000_000
 LAST_STAMP = (1 << 31) * NANOSECONDS - 1  # seconds of a stamp are an int32: until 2038
@@ -22,6 +23,32 @@ class Level(IntEnum):
     WARN = 1
     ERROR = 2
     STALE = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """
+    Which speeds a machine ran at.
+
+    Attributes
+    ----------
+    machine : str
+        Its name, empty if the topic tells none.
+    stamp_ns : (n,) int array
+        When [ns].
+    speed : (n,) float array
+        [rad/s].
+
+    """
+
+    machine: str
+    stamp_ns: IntArray
+    speed: FloatArray
+
+    @property
+    def speed_rpm(self) -> FloatArray:
+        """Speeds, (n,) [rpm]."""
+        return rad_s_to_rpm(self.speed)
 
 
 @dataclass(frozen=True, slots=True)

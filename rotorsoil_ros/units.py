@@ -3,6 +3,8 @@
 import math
 from typing import TypeVar
 
+import numpy as np
+
 from rotorsoil_ros.arrays import FloatArray
 
 RADIANS_PER_TURN = 2.0 * math.pi
@@ -29,3 +31,20 @@ def hz_to_rad_s(frequency_hz: Number) -> Number:
 def rad_s_to_hz(omega: Number) -> Number:
     """Return rad/s as cycles per second."""
     return omega / RADIANS_PER_TURN
+
+
+def to_um_pp(amplitude: FloatArray) -> FloatArray:
+    """Return zero-to-peak amplitudes in m as micrometres peak-to-peak (rad as microradians)."""
+    return 2e6 * amplitude
+
+
+def to_mm_s_rms(amplitude: FloatArray) -> FloatArray:
+    """Return zero-to-peak velocities in m/s as mm/s rms (rad/s as mrad/s)."""
+    return 1e3 / math.sqrt(2.0) * amplitude
+
+
+def to_lag_deg(phase: FloatArray) -> FloatArray:
+    """Return phases in rad, lead positive, as degrees of lag in [0, 360)."""
+    # Of a tiny lead the remainder would round up to the full turn that it stands for.
+    lag = np.mod(-np.degrees(phase), 360.0)
+    return np.where(lag == 360.0, 0.0, lag)

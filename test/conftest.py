@@ -12,7 +12,7 @@ from hypothesis import settings
 import numpy as np
 import pytest
 
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.rotor import beam
 
 PAPER_ROTOR = Path(__file__).parents[1] / 'config' / 'paper_rotor.yaml'

@@ -9,8 +9,10 @@ from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection
-from rotorsoil_ros.rotor.bearing import Pedestal, SpeedTable
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.bearing import Bearing, Pedestal, SpeedTable
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 
 STEEL = Material(2.09e11, 0.3, 7920.0)
 # From I = 7887 mm^4 and 1.9 kg of shaft: the rounded figures of the paper move peaks by 1 %.

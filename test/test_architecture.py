@@ -23,10 +23,13 @@ DAG = {
 }
 ROS = {'rclpy', 'builtin_interfaces', 'diagnostic_msgs', 'lifecycle_msgs', 'rcl_interfaces',
        'sensor_msgs', 'std_msgs', 'std_srvs'}
+# The package itself: its names are looked up when somebody asks, so that it may name every wing.
+FACE = 'rotorsoil_ros'
 # What only these wings may import, at the top or lazily.
 OWNERS = {
     **{name: {'node'} for name in ROS}, 'rerun': {'screen'}, 'mcap': {'bags'},
-    'matplotlib': {'figures'}, 'pydantic': {'case'}, 'yaml': {'case', 'bags'},
+    'matplotlib': {'figures'}, 'pandas': {BASE}, 'xarray': {BASE}, 'pydantic': {'case'},
+    'yaml': {'case', 'bags'},
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},
 }
 LONGEST_ROOM, SHORTEST_ROOM = 400, 60
@@ -38,7 +41,7 @@ UNDER_WAY = {
     'rotorsoil_ros.monitor.identification',
     'rotorsoil_ros.case.writer',
     'rotorsoil_ros.monitor.peak_pairs', 'rotorsoil_ros.monitor.rules',
-    'rotorsoil_ros.rotor.balance', 'monitor', 'twice',
+    'monitor', 'twice',
 }
 
 
@@ -83,7 +86,8 @@ def named_in(path):
             yield from re.findall(r'rotorsoil_ros(?:\.\w+)+', node.value)
 
 
-@pytest.mark.parametrize('path', finished(ROOMS), ids=name_of)
+@pytest.mark.parametrize(
+    'path', [path for path in finished(ROOMS) if name_of(path) != FACE], ids=name_of)
 def test_room_takes_from_below_only(path):
     allowed = below(wing_of(name_of(path)))
     ours = [name for name in named_in(path) if name.split('.')[0] == 'rotorsoil_ros']

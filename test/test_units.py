@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from rotorsoil_ros import units
@@ -15,3 +16,7 @@ def test_one_turn_per_second_is_sixty_rpm():
 def test_conversions_undo_each_other():
     assert units.rad_s_to_rpm(units.rpm_to_rad_s(1234.5)) == pytest.approx(1234.5, rel=1e-15)
     assert units.rad_s_to_hz(units.hz_to_rad_s(12.5)) == pytest.approx(12.5, rel=1e-15)
+
+
+def test_tiny_lead_is_no_lag_rather_than_a_turn():
+    assert units.to_lag_deg(np.array([1e-18, 0.0])).tolist() == [0.0, 0.0]

@@ -11,7 +11,7 @@ from typing import Protocol
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import BATCH, Place, place
 from rotorsoil_ros.bags.writer import LogFile
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Event, LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.monitor.criteria import criteria

@@ -11,10 +11,10 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.events import NANOSECONDS, Profile
 from rotorsoil_ros.units import rpm_to_rad_s, SECONDS_PER_MINUTE
 from rotorsoil_ros.wire.cdr import ARRAYS
-from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
+from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import raw_channel, ROTOR_JOINT, SPEED_TOPICS, SpeedReader, TOPICS
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
@@ -77,6 +77,44 @@ def speed_profile(path: Path, *, rotor_joint: str = ROTOR_JOINT) -> Iterator[Spe
                 batch.type, rotor_joint=rotor_joint, note=lambda reason, count: None)
         speeds = readers[batch.topic].read(batch.log_time_ns, batch.payloads)
         yield SpeedBatch(batch.topic, np.array(speeds.stamps, dtype=np.int64), speeds.speed)
+
+
+def read_profile(
+    path: str | Path, *, machine: str | None = None, rotor_joint: str = ROTOR_JOINT,
+) -> Profile:
+    """
+    Read at which speeds a machine ran.
+
+    Parameters
+    ----------
+    path : str or Path
+        MCAP file or bag.
+    machine : str or None
+        Which machine; None for the only one.
+    rotor_joint : str
+        Joint whose velocity is the rotor speed.
+
+    Returns
+    -------
+    Profile
+        Stamps [ns] and speeds [rad/s] in the order in which they were recorded.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, tells of no machine or no such one, or of several.
+
+    """
+    found: dict[str, list[SpeedBatch]] = {}
+    for batch in speed_profile(Path(path), rotor_joint=rotor_joint):
+        told = place(batch.topic, JOINT_STATE) or place(batch.topic, FLOAT64)
+        found.setdefault(told.machine if told else '', []).append(batch)
+    wanted = next(iter(found), '') if machine is None and len(found) == 1 else machine
+    if wanted is None or wanted not in found:
+        raise InputError(f'{path}: machine must be one of {", ".join(found) or "none: no speed"}'
+                         + (f', got {machine}' if machine else ''))
+    return Profile(wanted, np.concatenate([batch.stamp_ns for batch in found[wanted]]),
+                   np.concatenate([batch.speed for batch in found[wanted]]))
 
 
 def write_speed_profile(

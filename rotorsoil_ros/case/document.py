@@ -1,6 +1,6 @@
 """What a YAML file says, read as if nobody could be trusted to have written it well."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 import re
@@ -192,13 +192,54 @@ def override(document: dict[str, Any], overrides: Sequence[str]) -> None:
         source = f'--set {shown(setting)[1:-1]}'
         if not equals or not all(path.split('.')):
             raise InputError(f'{source}: must be key.path=value')
-        *parents, last = path.split('.')
-        place: Any = document
-        for depth, step in enumerate(parents):
-            known = '.'.join(parents[:depth]) or 'the case'
-            place = _enter(place, step, known=known, source=source)
-        _assign(place, last, parse(value, source=source), source=source,
-                known='.'.join(parents) or 'the case')
+        _put(document, path.split('.'), parse(value, source=source), source=source)
+
+
+def replace_keys(document: dict[str, Any], given: Mapping[str, object]) -> None:
+    """
+    Put values at key paths of a document, in place and in order.
+
+    Parameters
+    ----------
+    document : dict
+        As `read` returns it.
+    given : mapping
+        Values by key path, as in `override`. A mapping goes key by key into what is there,
+        everything else replaces it; arrays and their numbers become plain ones.
+
+    Raises
+    ------
+    InputError
+        If a path leads through something that is not there.
+
+    """
+    for path, value in given.items():
+        if isinstance(value, Mapping) and value:
+            replace_keys(document, {f'{path}.{key}': entry for key, entry in value.items()})
+        elif not all(path.split('.')):
+            raise InputError(f'{shown(path)}: must be key.path')
+        else:
+            _put(document, path.split('.'), _plain(value), source=path)
+
+
+def _plain(value: object) -> object:
+    """Return what YAML would hold instead of arrays, tuples and paths."""
+    if hasattr(value, 'tolist'):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return str(value) if isinstance(value, Path) else value
+
+
+def _put(document: dict[str, Any], steps: Sequence[str], value: Any, *, source: str) -> None:
+    *parents, last = steps
+    place: Any = document
+    for depth, step in enumerate(parents):
+        known = '.'.join(parents[:depth]) or 'the case'
+        place = _enter(place, step, known=known, source=source)
+    _assign(place, last, value, source=source, known='.'.join(parents) or 'the case')
 
 
 def _enter(place: Any, step: str, *, known: str, source: str) -> Any:

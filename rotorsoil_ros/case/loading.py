@@ -1,72 +1,16 @@
 """How do machines come into memory: every table is computed once, and not in this process."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 import os
 from pathlib import Path
 import subprocess
 import sys
 
-import numpy as np
-
-import rotorsoil_ros
-from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.case.cache import Cache
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.ground.half_space import a0_range, InfiniteElementModel
-from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.response import ResponseTable
-
-UNITS = {
-    'position': 'displacement, m or rad, zero-to-peak',
-    'velocity': 'm/s or rad/s, zero-to-peak',
-    'effort': 'transmitted force, N or N m, zero-to-peak',
-    'phase': 'rad',
-    'convention': 'x(t) = Re(X exp(+i omega t))',
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Machine:
-    """A case with its models, its response table, and the cache where more of it may lie."""
-
-    case: config.Case
-    model: CoupledModel
-    table: ResponseTable
-    directory: Path
-
-    @classmethod
-    def load(
-        cls, case_file: Path, *, cache_directory: Path | None, overrides: Sequence[str] = (),
-    ) -> 'Machine':
-        """Read a case and load its table, computing it where the cache has none."""
-        case = config.load(case_file, overrides)
-        directory = cache.directory(cache_directory)
-        model = models.coupled_model(case, directory)
-        return cls(case, model, models.response_table(case, model, directory), directory)
-
-    def _compliance_keys(self) -> dict[str, str]:
-        return {f'compliance of {foundation.name}': models.key_of(soil)
-                for foundation, soil in zip(self.model.foundations, self.model.soil_models,
-                                            strict=True)
-                if isinstance(soil, InfiniteElementModel)}
-
-    def description(self, name: str, unbalance: ComplexArray) -> Mapping[str, object]:
-        """Return what the predictions under this name and this unbalance rest on."""
-        return {
-            'machine': name, 'case': self.case.name, 'version': rotorsoil_ros.__version__,
-            'support': self.case.support.model,
-            'tables': {'response': self.table.key, **self._compliance_keys()},
-            'accuracy': self.table.accuracy,
-            'speed_range_rad_s': list(self.table.speed_range),
-            'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
-            'unbalance': {
-                disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
-                for disc, value in zip(self.table.planes, unbalance, strict=True)},
-            'units': UNITS,
-        }
-
+from rotorsoil_ros.ground.half_space import a0_range
 
 GLANCE_S = 0.05
 BAD_INPUT = 2
@@ -104,7 +48,7 @@ def load_all(
         tabulate(list(dict.fromkeys(kinds.values())), directory, tell=tell)
         tabulate([file for file, case in cases.items() if not _is_tabulated(case, directory)],
                  directory, tell=tell)
-    return {file: Machine.load(file, cache_directory=cache_directory) for file in cases}
+    return {file: _complete(file, cache_directory) for file in cases}
 
 
 def soil_keys(case: config.Case) -> list[str]:
@@ -132,7 +76,14 @@ def reload(file: Path, *, cache_directory: Path | None) -> Machine:
     """
     directory = cache.directory(cache_directory)
     tabulate([file], directory, tell=lambda text: None)
-    return Machine.load(file, cache_directory=cache_directory)
+    return _complete(file, cache_directory)
+
+
+def _complete(file: Path, cache_directory: Path | None) -> Machine:
+    """Return a machine with its table: a callback must not have to wait for it."""
+    machine = Machine.load(file, cache_directory=cache_directory)
+    _ = machine.table
+    return machine
 
 
 def tabulate(files: Sequence[Path], directory: Path, *, tell: Tell) -> None:

@@ -11,6 +11,13 @@ from rotorsoil_ros.ground.elements.table import DimensionlessTable
 from rotorsoil_ros.ground.half_space import a0_range, ALGORITHM, InfiniteElementModel
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
+from rotorsoil_ros.machine.band import (
+    depends_on_soil,
+    highest_poisson_ratio,
+    on_soils,
+    ResponseBand,
+    SoilSpread,
+)
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 
@@ -145,3 +152,18 @@ def response_table(case: Case, model: CoupledModel, directory: Path) -> Response
     table = replace(ResponseTable.build(model, case.speed_range), key=response_key(case, model))
     Cache(directory).store('response', table.key, table.to_arrays())
     return table
+
+
+def response_band(
+    case: Case, model: CoupledModel, table: ResponseTable, spread: SoilSpread | None = None,
+) -> ResponseBand | None:
+    """
+    Return the response of a case on all soils of its spread, or of another one.
+
+    None on a support that knows of no soil.
+    """
+    if case.soil is None or not depends_on_soil(model):
+        return None
+    soils = (spread or case.uncertainty).soils(
+        case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
+    return ResponseBand.build(table, on_soils(model, soils[1:]))

@@ -12,9 +12,10 @@ from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.schema import Place
 from rotorsoil_ros.errors import require
-from rotorsoil_ros.rotor.assembly import Disc, Material, Probe, Rotor, ShaftSection
-from rotorsoil_ros.rotor.balance import permissible_unbalance
+from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing, Pedestal, SpeedTable
+from rotorsoil_ros.rotor.disc import Disc, permissible_unbalance
+from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 from rotorsoil_ros.units import rpm_to_rad_s
 
 _INERTIAS = ('mass', 'diametral_inertia', 'polar_inertia')

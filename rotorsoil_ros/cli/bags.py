@@ -11,7 +11,7 @@ from rotorsoil_ros.cli.sweeps import opened
 def predict(arguments: Namespace) -> int:
     """Answer every speed of a profile and log it as the node would."""
     from rotorsoil_ros.bags.predict import predict as answer
-    from rotorsoil_ros.case.loading import Machine
+    from rotorsoil_ros.case.machine import Machine
     from rotorsoil_ros.screen import recorder
 
     machine = Machine.load(

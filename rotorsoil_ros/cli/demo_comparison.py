@@ -12,7 +12,7 @@ import numpy as np
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.run import read_run, Reading
 from rotorsoil_ros.bags.synthetic import profile, Truth, write_synthetic
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.cli.compare import compare
 from rotorsoil_ros.cli.parser import parser
 from rotorsoil_ros.cli.progress import progress

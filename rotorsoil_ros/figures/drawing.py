@@ -11,7 +11,8 @@ import numpy as np
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.ground.soil import Circle
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.rotor.assembly import Bearing, Disc
+from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.rotor.disc import Disc
 
 STEEL, DISC, CONCRETE, SOIL = '#7d98b3', '#d9a441', '#c9c9c4', '#c8ad7f'
 HOUSING, STAND, SPRING = '#5b6770', '#a9a9a9', '#b03a2e'

@@ -14,7 +14,7 @@ from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupling import Answer, answer
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.support import Support
-from rotorsoil_ros.prediction import FrequencyResponse, Prediction
+from rotorsoil_ros.prediction import Prediction, Response
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.whirl import WhirlModes
 
@@ -164,7 +164,7 @@ class CoupledModel:
 
     def frequency_response(
         self, omega: FloatArray, *, speed: float, channel: str,
-    ) -> FrequencyResponse:
+    ) -> Response:
         """
         Solve for the response to a unit harmonic force while the rotor turns at fixed speed.
 
@@ -191,7 +191,7 @@ class CoupledModel:
 
     def harmonic_response(
         self, speed: FloatArray, *, order: float, channel: str,
-    ) -> FrequencyResponse:
+    ) -> Response:
         """
         Solve for the response to a unit harmonic force at a multiple of the speed.
 
@@ -212,14 +212,14 @@ class CoupledModel:
 
     def _forced(
         self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, channel: str,
-    ) -> FrequencyResponse:
+    ) -> Response:
         if channel not in self.channels:
             raise RotorSoilError(f'force must act at one of {", ".join(self.channels)}, '
                                  f'got {channel}')
         load = np.zeros((len(self.channels), 1), dtype=complex)
         load[self.channels.index(channel)] = 1.0
         displacement, force = self._respond(modes, omega, speed, self._sorted(load))
-        return FrequencyResponse(speed, omega, displacement[..., 0], force[..., 0])
+        return Response(self.channels, speed, omega, displacement[..., 0], force[..., 0])
 
     def _sorted(self, loads: ComplexArray) -> ComplexArray:
         """Put loads on the channels, (c, k), into the order of ports, housings and blocks."""

@@ -13,7 +13,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.spectrum import Spectrum, SpectrumSolver
-from rotorsoil_ros.units import rad_s_to_hz
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Speeds at which the search for criticals begins, and up to how many it looks closer.
 _FIRST_SPEEDS = 41
@@ -61,6 +61,16 @@ class Campbell:
     whirl: IntArray
     branch: IntArray
     untold: FloatArray
+
+    @property
+    def speed_rpm(self) -> FloatArray:
+        """Rotor speed, (n,) [rpm]."""
+        return rad_s_to_rpm(self.speed)
+
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Damped frequency, (n, m) [Hz]."""
+        return rad_s_to_hz(self.omega)
 
     @property
     def omega(self) -> FloatArray:
@@ -144,6 +154,11 @@ class CriticalSpeed:
     damping_ratio: float
     deflection: ComplexArray
     support: ComplexArray
+
+    @property
+    def speed_rpm(self) -> float:
+        """Where omega = Omega [rpm]."""
+        return rad_s_to_rpm(self.speed)
 
     @property
     def amplification_factor(self) -> float:

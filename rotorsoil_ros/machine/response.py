@@ -238,6 +238,15 @@ class Predictor:
         rows = self._row(float(speed[0])) if len(speed) == 1 else self._rows(speed)
         return Prediction.of_parts(speed, rows.reshape(len(speed), 2, 2, len(self.channels)))
 
+    def answer(self, speed: FloatArray) -> Prediction:
+        """Look up the response, NaN where a speed, (n,) [rad/s], is not covered."""
+        speed = np.asarray(speed, dtype=float)
+        parts = np.full((len(speed), 2, 2, len(self.channels)), np.nan)
+        covered = self.covers(speed)
+        if covered.any():
+            parts[covered] = self.predict(speed[covered]).parts
+        return Prediction.of_parts(speed, parts)
+
     def _row(self, speed: float) -> FloatArray:
         pieces = self.table.pieces
         index = pieces.find_one(speed)

@@ -17,14 +17,7 @@ from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
-from rotorsoil_ros.machine.band import (
-    depends_on_soil,
-    Envelope,
-    highest_poisson_ratio,
-    on_soils,
-    ResponseBand,
-    SoilSpread,
-)
+from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
@@ -80,11 +73,7 @@ class Expectation:
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
-        band = None
-        if case.soil is not None and depends_on_soil(model):
-            soils = spread.soils(
-                case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
-            band = ResponseBand.build(table, on_soils(model, soils[1:]))
+        band = models.response_band(case, model, table, spread)
         note = ''
         try:
             modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
@@ -160,11 +149,7 @@ class Expectation:
 
 def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
     """Return displacements, (m, c), NaN where the table has none."""
-    found = np.full((len(speed), len(predictor.channels)), complex(np.nan, np.nan))
-    covered = predictor.covers(speed)
-    if covered.any():
-        found[covered] = predictor.predict(speed[covered]).displacement
-    return found
+    return predictor.answer(speed).displacement
 
 
 _KIND = 'criteria'

@@ -6,7 +6,7 @@ from pathlib import Path
 import subprocess
 
 from rotorsoil_ros.arrays import ComplexArray
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.monitor.criteria import Criteria, start_aside, stored_criteria
 
 Tell = Callable[[str], object]

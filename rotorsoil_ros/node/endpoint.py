@@ -12,7 +12,8 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.case import config
-from rotorsoil_ros.case.loading import Machine, reload
+from rotorsoil_ros.case.loading import reload
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.events import Event, Level, Remark, Sink
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.node.criteria_feed import Bench

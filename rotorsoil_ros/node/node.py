@@ -26,7 +26,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from rotorsoil_ros.case import cache
-from rotorsoil_ros.case.loading import load_all, Machine
+from rotorsoil_ros.case.loading import load_all
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch

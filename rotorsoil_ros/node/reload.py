@@ -8,7 +8,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode
 from std_srvs.srv import Trigger
 
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import RotorSoilError
 
 GLANCE_S = 0.05

@@ -12,7 +12,7 @@ from rotorsoil_ros.background import Aside
 from rotorsoil_ros.bags.recorder import BagAside, Recorder
 from rotorsoil_ros.bags.retention import Recovery
 from rotorsoil_ros.bags.writer import new_directory
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Diagnostics, Event, Model
 from rotorsoil_ros.screen import open_viewer

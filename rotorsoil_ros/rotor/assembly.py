@@ -10,107 +10,11 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.rotor.beam import BeamElements, plane_matrices
 from rotorsoil_ros.rotor.bearing import Bearing
-
-__all__ = ['Bearing', 'Disc', 'Material', 'Probe', 'Rotor', 'ShaftSection']
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Probe, ShaftSection
 
 # Stations closer than this share of the shaft length to a node are that node.
 _SAME_NODE = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Material:
-    """Linear elastic material: E [Pa], nu [-], rho [kg/m^3]."""
-
-    young_modulus: float
-    poisson_ratio: float
-    density: float
-
-    def __post_init__(self) -> None:
-        require(0.0 < self.young_modulus < math.inf, 'young_modulus', '> 0 Pa and finite',
-                self.young_modulus)
-        require(-1.0 < self.poisson_ratio <= 0.5, 'poisson_ratio', 'in (-1, 0.5]',
-                self.poisson_ratio)
-        require(0.0 <= self.density < math.inf, 'density', '>= 0 kg/m^3 and finite', self.density)
-
-
-@dataclass(frozen=True, slots=True)
-class ShaftSection:
-    """
-    Piece of shaft whose diameters vary linearly, divided evenly into elements.
-
-    Attributes
-    ----------
-    length : float
-        [m].
-    outer_diameter, inner_diameter : tuple of two floats
-        At the left and the right end [m].
-    elements : int
-        Number of finite elements, at least 1.
-    material : Material
-        What it is made of.
-    added_mass : float
-        Mass per length that does not stiffen [kg/m].
-
-    """
-
-    length: float
-    outer_diameter: tuple[float, float]
-    inner_diameter: tuple[float, float]
-    elements: int
-    material: Material
-    added_mass: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(0.0 < self.length < math.inf, 'length', '> 0 m and finite', self.length)
-        require(self.elements >= 1, 'elements', 'at least 1', self.elements)
-        require(0.0 <= self.added_mass < math.inf, 'added_mass', '>= 0 kg/m and finite',
-                self.added_mass)
-        for outer, inner in zip(self.outer_diameter, self.inner_diameter, strict=True):
-            require(0.0 < outer < math.inf, 'outer_diameter', '> 0 m and finite', outer)
-            require(0.0 <= inner < outer, 'inner_diameter',
-                    f'>= 0 m and less than the outer diameter {outer:g} m', inner)
-
-
-@dataclass(frozen=True, slots=True)
-class Disc:
-    """Rigid disc: position along the shaft [m], mass [kg], inertias [kg m^2]."""
-
-    name: str
-    position: float
-    mass: float
-    diametral_inertia: float
-    polar_inertia: float
-
-    def __post_init__(self) -> None:
-        require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)
-        require(0.0 <= self.diametral_inertia < math.inf, 'diametral_inertia',
-                '>= 0 kg m^2 and finite', self.diametral_inertia)
-        require(0.0 <= self.polar_inertia < math.inf, 'polar_inertia', '>= 0 kg m^2 and finite',
-                self.polar_inertia)
-
-    @classmethod
-    def cylinder(
-        cls, name: str, position: float, *, outer_diameter: float, inner_diameter: float,
-        width: float, density: float,
-    ) -> 'Disc':
-        """Return a homogeneous cylindrical disc by its dimensions [m] and density [kg/m^3]."""
-        require(0.0 < outer_diameter < math.inf, 'outer_diameter', '> 0 m and finite',
-                outer_diameter)
-        require(0.0 <= inner_diameter < outer_diameter, 'inner_diameter',
-                f'>= 0 m and less than the outer diameter {outer_diameter:g} m', inner_diameter)
-        require(0.0 < width < math.inf, 'width', '> 0 m and finite', width)
-        require(0.0 < density < math.inf, 'density', '> 0 kg/m^3 and finite', density)
-        mass = density * math.pi / 4.0 * (outer_diameter**2 - inner_diameter**2) * width
-        polar = mass * (outer_diameter**2 + inner_diameter**2) / 8.0
-        return cls(name, position, mass, polar / 2.0 + mass * width**2 / 12.0, polar)
-
-
-@dataclass(frozen=True, slots=True)
-class Probe:
-    """Station of the shaft whose motion is wanted: position along the shaft [m]."""
-
-    name: str
-    position: float
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import across, Channel, DOFS, JOURNAL
 from rotorsoil_ros.ground.soil import Rectangle
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.rotor.assembly import Disc
+from rotorsoil_ros.rotor.disc import Disc
 
 SHAFT_POINTS = 61
 ORBIT_POINTS = 33

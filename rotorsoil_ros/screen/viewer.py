@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from rotorsoil_ros.arrays import ComplexArray
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import (
     Band,

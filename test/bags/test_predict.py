@@ -15,7 +15,7 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.wire.cdr import joint_states, Layout
 from rotorsoil_ros.wire.definitions import JOINT_STATE

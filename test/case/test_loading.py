@@ -47,7 +47,7 @@ def test_soils_of_one_kind_are_computed_by_one_case(cases, tmp_path, monkeypatch
     stages = []
     monkeypatch.setattr(loading, 'tabulate', lambda files, *_, **__: stages.append(files))
     monkeypatch.setattr(loading, '_is_tabulated', lambda *_: False)
-    monkeypatch.setattr(loading.Machine, 'load', lambda file, **_: file)
+    monkeypatch.setattr(loading, '_complete', lambda file, _: file)
     load_all([soft, stiff, damp], cache_directory=tmp_path / 'c', tell=print)
     assert stages == [[soft, damp], [soft, stiff, damp]]
 

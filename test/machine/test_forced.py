@@ -9,8 +9,10 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Rotor, ShaftSection
-from rotorsoil_ros.rotor.bearing import Pedestal
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, ShaftSection
 
 from machines import (
     bearing,

@@ -16,8 +16,10 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import campbell, critical_speeds
 from rotorsoil_ros.machine.spectrum import SpectrumSolver
-from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection
-from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 
 from machines import (
     bearing,

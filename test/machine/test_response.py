@@ -10,7 +10,7 @@ from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.rotor.assembly import Disc
+from rotorsoil_ros.rotor.disc import Disc
 
 from machines import bearing, paper_machine, STEEL, two_blocks, uniform_rotor
 

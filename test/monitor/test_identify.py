@@ -9,7 +9,9 @@ from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.monitor.identify import identify, identify_unbalance
-from rotorsoil_ros.rotor.assembly import Disc, Material, Rotor, ShaftSection
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, ShaftSection
 
 from machines import bearing
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rclpy.parameter import Parameter
 
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.node.node import RotorsoilNode
 
 FAN = Path('config/plant_fan.yaml')

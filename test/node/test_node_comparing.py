@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import Imu, JointState
 
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.node.node import RotorsoilNode
 

@@ -17,7 +17,7 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.node.node import RotorsoilNode
 from rotorsoil_ros.node.replay import replay

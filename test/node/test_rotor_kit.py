@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import import_run_up, speed_profile
-from rotorsoil_ros.case.loading import Machine
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.node.node import RotorsoilNode
 from rotorsoil_ros.node.replay import replay
 

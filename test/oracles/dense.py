@@ -7,7 +7,7 @@ import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.machine.coupled import CoupledModel, UNBALANCE_FORCE
-from rotorsoil_ros.prediction import FrequencyResponse, Prediction
+from rotorsoil_ros.prediction import Prediction, Response
 from rotorsoil_ros.rotor.assembly import Rotor
 
 
@@ -71,7 +71,7 @@ def dense_response(
 
 def dense_forced(
     model: CoupledModel, omega: FloatArray, speed: FloatArray, channel: str,
-) -> FrequencyResponse:
+) -> Response:
     """
     Solve for the response to a unit force at a channel.
 
@@ -94,7 +94,7 @@ def dense_forced(
     displacement, force = system.solve(load)
     first = 4 * len(model.rotor.bearings) + 2 * (len(model.rotor.discs) + len(model.rotor.probes))
     force[:, first:] += place[blocks]
-    return FrequencyResponse(speed, omega, displacement, force)
+    return Response(model.channels, speed, omega, displacement, force)
 
 
 def dense_eigenvalues(

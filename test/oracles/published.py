@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.rotor.assembly import Disc, Material
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material
 
 from machines import bearing, uniform_rotor
 from oracles.dense import rotor_matrices

@@ -8,8 +8,11 @@ from scipy.integrate import trapezoid
 import scipy.linalg
 
 from rotorsoil_ros.errors import RotorSoilError
-from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Probe, Rotor, ShaftSection
+from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.beam import shear_coefficient
+from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 
 from machines import bearing, paper_rotor, STEEL, uniform_rotor
 from oracles.dense import rotor_matrices

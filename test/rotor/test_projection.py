@@ -7,7 +7,7 @@ import pytest
 
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.rotor import whirl
-from rotorsoil_ros.rotor.assembly import Disc
+from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.projection import shapes_at_ports
 from rotorsoil_ros.rotor.whirl import held
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from rotorsoil_ros.rotor.assembly import Disc, Material
+from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.reduced import ReducedRotor
+from rotorsoil_ros.rotor.shaft import Material
 from rotorsoil_ros.rotor.whirl import held
 
 from machines import bearing, paper_machine, STEEL, two_blocks, uniform_rotor

@@ -1,0 +1,315 @@
+"""What does a machine on its soil answer? A case with its models, asked in plant units."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+import math
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+import rotorsoil_ros
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.case import cache, config, document, models
+from rotorsoil_ros.case.summary import undecided
+from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
+from rotorsoil_ros.events import Profile
+from rotorsoil_ros.ground.half_space import InfiniteElementModel
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes import Campbell, campbell, critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.prediction import Bounds, columns_of, Response
+from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
+
+# What a message holds of an answer, in a log that has to explain itself.
+UNITS = {
+    'position': 'displacement, m or rad, zero-to-peak',
+    'velocity': 'm/s or rad/s, zero-to-peak',
+    'effort': 'transmitted force, N or N m, zero-to-peak',
+    'phase': 'rad',
+    'convention': 'x(t) = Re(X exp(+i omega t))',
+}
+MODES = 8  # of a Campbell diagram, unless somebody asks for more
+
+Numbers: TypeAlias = float | Sequence[float] | FloatArray
+
+
+@dataclass(frozen=True)
+class Machine:
+    """
+    A machine on its soil, as its case file describes it.
+
+    Models and tables are computed when something asks for them, and come out of the cache
+    where they have been computed before.
+
+    Attributes
+    ----------
+    case : Case
+        What the file says.
+    directory : Path
+        Of the cache.
+
+    """
+
+    case: config.Case
+    directory: Path
+
+    @classmethod
+    def load(
+        cls, case_file: Path, *, cache_directory: Path | None = None,
+        overrides: Sequence[str] = (),
+    ) -> 'Machine':
+        """Read a case; settings `key.path=value` replace or add to what the file says."""
+        return cls(config.load(case_file, overrides), cache.directory(cache_directory))
+
+    @cached_property
+    def model(self) -> CoupledModel:
+        """Rotor, blocks and soil as one system of equations."""
+        return models.coupled_model(self.case, self.directory)
+
+    @cached_property
+    def table(self) -> ResponseTable:
+        """The response over the whole speed range, which a running machine is looked up in."""
+        return models.response_table(self.case, self.model, self.directory)
+
+    def response(self, *, rpm: Numbers) -> Response:
+        """
+        Solve for the response to the unbalance of the case, exactly at every speed.
+
+        Parameters
+        ----------
+        rpm : float or (n,) floats
+            Rotor speeds [rpm]; within the tables of bearings and ground, where there are any.
+
+        Returns
+        -------
+        Response
+            Over n speeds and all channels [m, rad, N, N m].
+
+        Raises
+        ------
+        OutOfTableError
+            If a speed is beyond a table of the case.
+        NotSolvedError
+            If an undamped resonance is hit.
+
+        """
+        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        return Response.of(self.model.channels,
+                           self.model.unbalance_response(speed, self.case.unbalance))
+
+    def frf(self, *, force: str, hz: Numbers, rpm: float = 0.0) -> Response:
+        """
+        Solve for the response to a harmonic force of 1 N while the rotor turns steadily.
+
+        Parameters
+        ----------
+        force : str
+            Channel at and along which the force acts; a rotation of a block takes 1 N m.
+        hz : float or (n,) floats
+            Frequencies of the force [Hz].
+        rpm : float
+            Rotor speed [rpm]; at 0 an impact test at rest.
+
+        Returns
+        -------
+        Response
+            Over n frequencies and all channels, per newton or newton metre.
+
+        Raises
+        ------
+        RotorSoilError
+            If there is no such channel.
+        OutOfTableError, NotSolvedError
+            As `response`.
+
+        """
+        columns_of(self.model.channels, force)
+        omega, [speed] = hz_to_rad_s(_numbers('hz', hz)), rpm_to_rad_s(_numbers('rpm', rpm))
+        return self.model.frequency_response(omega, speed=float(speed), channel=force)
+
+    def order_response(self, *, order: float, force: str, rpm: Numbers) -> Response:
+        """
+        Solve for the response to a force of 1 N at a multiple of the speed.
+
+        Parameters
+        ----------
+        order : float
+            Frequency of the force over the speed, as 2 of a two-bladed fan or 0.5 of a belt.
+        force : str
+            As in `frf`.
+        rpm : float or (n,) floats
+            Rotor speeds [rpm].
+
+        """
+        columns_of(self.model.channels, force)
+        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        return self.model.harmonic_response(speed, order=order, channel=force)
+
+    def campbell(self, *, rpm: Numbers, modes: int = MODES) -> Campbell:
+        """
+        Return the lowest modes at each speed.
+
+        Parameters
+        ----------
+        rpm : float or (n,) floats
+            Rotor speeds, rising for the branches to make sense [rpm].
+        modes : int
+            How many at each speed; fewer where the machine has no more.
+
+        Returns
+        -------
+        Campbell
+            Frequencies [rad/s], damping ratios [-], whirl and branches, (n, modes) each.
+
+        Raises
+        ------
+        InputError
+            If what is known of the support does not determine the modes.
+
+        """
+        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        try:
+            return campbell(self.model, speed, modes)
+        except NotSolvedError as error:
+            raise self._undecided(error) from error
+
+    def critical_speeds(
+        self, *, rpm_range: tuple[float, float] | None = None,
+    ) -> tuple[CriticalSpeed, ...]:
+        """
+        Find the speeds that excite a mode with its own frequency, rising.
+
+        Parameters
+        ----------
+        rpm_range : tuple of two floats or None
+            Between which speeds [rpm]; None for the speed range of the case.
+
+        Raises
+        ------
+        InputError
+            If what is known of the support does not determine the modes.
+
+        """
+        low, high = (self.case.speed_range if rpm_range is None
+                     else rpm_to_rad_s(_numbers('rpm_range', rpm_range)).tolist())
+        try:
+            return critical_speeds(self.model, (low, high))
+        except NotSolvedError as error:
+            raise self._undecided(error) from error
+
+    def band(self, *, rpm: Numbers) -> Bounds:
+        """
+        Return between which amplitudes the response lies on all soils of the case's spread.
+
+        Parameters
+        ----------
+        rpm : float or (n,) floats
+            Rotor speeds [rpm].
+
+        Returns
+        -------
+        Bounds
+            Of every channel; NaN outside the speed range of the case.
+
+        Raises
+        ------
+        InputError
+            If the support knows of no soil, so that there is no band.
+
+        """
+        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        found = models.response_band(self.case, self.model, self.table)
+        if found is None:
+            raise InputError(f'{self.case.path}: support.model: {self.case.support.model} knows '
+                             'of no soil, so that there is no band')
+        bounds = found.envelope(self.case.unbalance).at(speed)
+        nominal = self.table.predictor(self.case.unbalance).answer(speed)
+        return Bounds(self.table.channels, speed, bounds.low, np.abs(nominal.displacement),
+                      bounds.high)
+
+    def predict(self, profile: Profile) -> Response:
+        """
+        Look up what the node would answer to the speeds of a profile, bit by bit the same.
+
+        Parameters
+        ----------
+        profile : Profile
+            Stamps and speeds, as `read_profile` finds them in a bag.
+
+        Returns
+        -------
+        Response
+            With the stamps of the profile; NaN where the table does not cover a speed.
+
+        """
+        answered = self.table.predictor(self.case.unbalance).answer(profile.speed)
+        return Response.of(self.table.channels, answered, profile.stamp_ns)
+
+    def description(self, name: str, unbalance: ComplexArray) -> Mapping[str, object]:
+        """Return what the predictions under this name and this unbalance, (p,), rest on."""
+        return {
+            'machine': name, 'case': self.case.name, 'version': rotorsoil_ros.__version__,
+            'support': self.case.support.model,
+            'tables': {'response': self.table.key, **self._compliance_keys()},
+            'accuracy': self.table.accuracy,
+            'speed_range_rad_s': list(self.table.speed_range),
+            'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
+            'unbalance': {
+                disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
+                for disc, value in zip(self.table.planes, unbalance, strict=True)},
+            'units': UNITS,
+        }
+
+    def _compliance_keys(self) -> dict[str, str]:
+        return {f'compliance of {foundation.name}': models.key_of(soil)
+                for foundation, soil in zip(self.model.foundations, self.model.soil_models,
+                                            strict=True)
+                if isinstance(soil, InfiniteElementModel)}
+
+    def _undecided(self, error: NotSolvedError) -> InputError:
+        """Return the same error with the key of the case that is to blame."""
+        return InputError(f'{self.case.path}: {undecided(self.case, error)}')
+
+
+def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: object) -> Machine:
+    """
+    Read the case file of a machine.
+
+    Parameters
+    ----------
+    case : str or Path
+        The YAML file.
+    cache_directory : Path or None
+        Where computed tables lie; None for $ROTORSOIL_CACHE, else the user's cache directory.
+    **overrides
+        Keys of the case to replace or to add: `soil={'shear_modulus': 30e6}`, or by their path,
+        `**{'rotor.bearings.0.stiffness.xx': 1e8}`. What a mapping does not name stays.
+
+    Returns
+    -------
+    Machine
+        Nothing is solved before it is asked.
+
+    Raises
+    ------
+    InputError
+        If the file is wrong, one line for each fault: file, key path, rule, unit and value.
+
+    """
+    path = Path(case)
+    content = document.read(path)
+    document.replace_keys(content, overrides)
+    return Machine(config.case_of(path, content), cache.directory(cache_directory))
+
+
+def _numbers(name: str, given: Numbers) -> FloatArray:
+    """Return finite numbers >= 0 as a flat array, (n,)."""
+    found = np.atleast_1d(np.asarray(given, dtype=float))
+    if found.ndim != 1 or not len(found):
+        raise RotorSoilError(f'{name} must be one number or some, got shape {found.shape}')
+    wrong = found[~((found >= 0.0) & (found < math.inf))]
+    if len(wrong):
+        raise RotorSoilError(f'{name} must be >= 0 and finite, got {wrong[0]:g}')
+    return found
