@@ -37,7 +37,7 @@ MACHINE = 'paper_rotor'
 _RUN_UP_S, _DWELL_S, _COAST_S, _RATE_HZ = 12.0, 3.0, 9.0, 100
 _SLOWEST_RPM, _FASTEST_RPM = 300.0, 8400.0
 
-_SHUTDOWN_S = 5.0
+_SHUTDOWN_S = 60.0  # for what hangs: a busy machine takes its time
 _ONE_DOMAIN_OF = 100
 
 

@@ -45,7 +45,7 @@ def recover_all(directory):
     recovery = Recovery(directory, tell=told.append, complain=complaints.append)
     while not recovery.is_done:
         if recovery._process is not None:
-            recovery._process.wait(20.0)
+            recovery._process.wait(600.0)
         recovery.step()
     return told, complaints
 

@@ -34,7 +34,7 @@ def test_another_process_leaves_them_for_exactly_this_unbalance(tmp_path):
     unbalance = case.unbalance * np.exp(0.1j)
     assert stored_criteria(case, model, unbalance, tmp_path) is None
     process = start_aside(KIT, unbalance, tmp_path)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=600)
     assert (process.returncode, said) == (0, '')
     found = stored_criteria(case, model, unbalance, tmp_path)
     assert found.envelope is None  # a bench knows of no soil
@@ -46,7 +46,7 @@ def test_case_that_is_wrong_is_told_in_one_line(tmp_path):
     wrong = tmp_path / 'wrong.yaml'
     wrong.write_text('name: wrong\n')
     process = start_aside(wrong, np.array([1.0 + 0j]), tmp_path)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=600)
     assert process.returncode == 1
     assert said.count('\n') == 1
     assert f'{wrong}: support: is missing' in said

@@ -15,7 +15,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 RELIABLE = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(1000))
-WANTED, DEADLINE_S, PERIOD_S = 20, 150.0, 0.02
+WANTED, DEADLINE_S, PERIOD_S = 20, 600.0, 0.02
 
 
 @dataclass

@@ -31,11 +31,12 @@ def test_another_stack_is_heard_and_answered(graph, cache):
         context=graph.context, parameter_overrides=[
             Parameter(name, value=value) for name, value in parameters.items()]))
     assert node.start()
-    peer = subprocess.Popen(
-        [sys.executable, str(PEER), str(graph.context.get_domain_id())], stdout=subprocess.PIPE,
-        text=True, env={**os.environ, 'CYCLONEDDS_URI': ON_THIS_HOST})
-    graph.until(lambda: peer.poll() is not None, 'the other program')
-    heard = json.loads(peer.communicate()[0])
+    with subprocess.Popen(
+            [sys.executable, str(PEER), str(graph.context.get_domain_id())],
+            stdout=subprocess.PIPE, text=True,
+            env={**os.environ, 'CYCLONEDDS_URI': ON_THIS_HOST}) as peer:
+        graph.until(lambda: peer.poll() is not None, 'the other program')
+        heard = json.loads(peer.communicate()[0])
     node.release()
 
     exact = fan.table.predictor(fan.case.unbalance).predict(np.array([120.0])).displacement[0]
