@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+from house import ROS
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'rotorsoil_ros'
 ROOMS = sorted(PACKAGE.rglob('*.py'))
@@ -21,8 +23,6 @@ DAG = {
     'figures': {'monitor'}, 'screen': {'monitor'}, 'node': {'bags', 'figures', 'screen'},
     'cli': {'node'},
 }
-ROS = {'rclpy', 'builtin_interfaces', 'diagnostic_msgs', 'lifecycle_msgs', 'rcl_interfaces',
-       'sensor_msgs', 'std_msgs', 'std_srvs'}
 # The package itself: its names are looked up when somebody asks, so that it may name every wing.
 FACE = 'rotorsoil_ros'
 # What only these wings may import, at the top or lazily.

@@ -6,9 +6,10 @@ import subprocess
 import sys
 
 import pytest
-from test_architecture import ROS
 
 from rotorsoil_ros.bags.profile import import_run_up
+
+from house import ROS
 
 ROOT = Path(__file__).parents[1]
 RUN_UP = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
