@@ -12,7 +12,7 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, config, document, models
-from rotorsoil_ros.case.summary import undecided
+from rotorsoil_ros.case.summary import stability_doubts, undecided, unstable
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
@@ -253,8 +253,12 @@ class Machine:
             'machine': name, 'case': self.case.name, 'version': rotorsoil_ros.__version__,
             'support': self.case.support.model,
             'tables': {'response': self.table.key, **self._compliance_keys()},
-            'accuracy': self.table.accuracy,
+            'accuracy': self.table.accuracy if math.isfinite(self.table.accuracy) else None,
             'speed_range_rad_s': list(self.table.speed_range),
+            'stable': not self.table.stability.instabilities and not self.table.stability.doubt,
+            'unstable_rad_s': self.table.stability.unstable.tolist(),
+            'unstable': list(unstable(self.table.stability)),
+            'doubts': list(stability_doubts(self.table.stability)),
             'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
             'unbalance': {
                 disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}

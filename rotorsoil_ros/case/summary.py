@@ -1,15 +1,19 @@
 """What can be said of a case before anything runs: derived quantities, and what looks odd."""
 
 from collections.abc import Iterator, Sequence
+import math
 
 import numpy as np
 
+from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.units import rad_s_to_rpm
+from rotorsoil_ros.machine.stability import Stability
+from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
 # quarter.
@@ -78,6 +82,7 @@ def warnings(case: Case) -> Iterator[str]:
         if disc.polar_inertia > 2.0 * disc.diametral_inertia:
             yield (f'{disc.name}: polar inertia {disc.polar_inertia:g} kg m^2 is more than twice '
                    f'the diametral {disc.diametral_inertia:g} kg m^2, which no body has')
+    yield from _of_bearings(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):
@@ -85,6 +90,58 @@ def warnings(case: Case) -> Iterator[str]:
                    'that about both others, which no body has')
         if case.soil is not None and case.support.model != 'rigid':
             yield from _of_soil(case, case.soil, foundation)
+
+
+def _of_bearings(case: Case) -> Iterator[str]:
+    """Yield where a bearing or a pedestal gives energy or pushes by itself."""
+    for index, bearing in enumerate(case.rotor.bearings):
+        parts = [('', bearing.stiffness, bearing.damping)]
+        if bearing.pedestal is not None:
+            parts.append(('pedestal.', bearing.pedestal.stiffness, bearing.pedestal.damping))
+        for place, *matrices in parts:
+            for name, unit, matrix in zip(('stiffness', 'damping'), ('N/m', 'N s/m'), matrices,
+                                          strict=True):
+                least = _least(matrix)
+                if least < 0.0:
+                    yield (f'rotor.bearings.{index}.{place}{name}: of {bearing.name} is negative '
+                           f'in some direction, {least:.4g} {unit}: '
+                           + ('it feeds vibration' if name == 'damping' else 'it pushes away'))
+
+
+def _least(matrix: FloatArray | SpeedTable) -> float:
+    """Return the smallest eigenvalue of the symmetric part, over all points of a table."""
+    values = matrix.values if isinstance(matrix, SpeedTable) else matrix
+    symmetric = 0.5 * (values + values.swapaxes(-2, -1))
+    least = float(np.linalg.eigvalsh(symmetric).min())
+    # Round-off of a matrix that is just not negative is none.
+    return least if least < -1e-12 * float(np.abs(values).max()) else 0.0
+
+
+def unstable(found: Stability) -> Iterator[str]:
+    """Yield for each mode that grows on its own which it is, where, and what feeds it."""
+    for one in found.instabilities:
+        low, high = rad_s_to_rpm(one.low), rad_s_to_rpm(one.high)
+        everywhere = (one.low, one.high) == found.span
+        where = f'at all speeds looked at, {low:g} to {high:g} rpm' if everywhere else (
+            f'from {low:.6g} to {high:.6g} rpm')
+        how = 'creeps away without whirling' if not one.whirl else (
+            f'{"forward" if one.whirl > 0 else "backward"} whirl at '
+            f'{rad_s_to_hz(one.frequency):.4g} Hz, damping ratio {one.damping_ratio:.3g} at '
+            f'{rad_s_to_rpm(one.speed):.4g} rpm')
+        fed = ' and '.join(
+            f'the {cause} of ' + ', '.join(f'{feed.name} ({feed.share:.0%})'
+                                           for feed in one.feeds if feed.cause == cause)
+            for cause in dict.fromkeys(feed.cause for feed in one.feeds))
+        yield f'unstable {where}: {one.name} ({how}) grows, fed by {fed}'
+
+
+def stability_doubts(found: Stability) -> Iterator[str]:
+    """Yield what is not known of the stability of a machine."""
+    if found.doubt:
+        yield f'whether the machine is stable is not known: {found.doubt}'
+    if found.untold_above < math.inf:
+        yield (f'whether a mode above {rad_s_to_hz(found.untold_above):.4g} Hz is stable is not '
+               'known: the support is not known there, and a bearing could feed one')
 
 
 def undecided(case: Case, error: NotSolvedError) -> str:

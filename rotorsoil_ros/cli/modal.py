@@ -8,12 +8,13 @@ import sys
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.summary import undecided
+from rotorsoil_ros.case.summary import stability_doubts, undecided, unstable
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import opened, values
 from rotorsoil_ros.errors import InputError, NotSolvedError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes import campbell as campbell_of, critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.stability import stability
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
 
@@ -23,7 +24,7 @@ def campbell(arguments: Namespace) -> int:
     model = models.coupled_model(case, cache.directory(arguments.cache))
     if arguments.criticals:
         with _naming(case):
-            return _criticals(arguments, model, case.speed_range)
+            return _criticals(arguments, case, model)
     if arguments.rpm is None:
         raise InputError('--rpm is missing; only --criticals has the speed range of the case')
     if arguments.running is not None:
@@ -35,6 +36,7 @@ def campbell(arguments: Namespace) -> int:
         if omega < math.inf:
             print(f'{case.path}: at {rad_s_to_rpm(at):g} rpm a mode near {rad_s_to_hz(omega):.4g} '
                   'Hz is missing: the support does not determine it', file=sys.stderr)
+    _tell_unstable(case, model, float(speed.max()))
     # A speed may have fewer modes than wanted.
     rows = [(at, mode + 1, *numbers) for at, *of_speed in zip(
                 speed.tolist(), found.omega.tolist(), found.damping_ratio.tolist(),
@@ -43,6 +45,14 @@ def campbell(arguments: Namespace) -> int:
     _write(arguments.output, ['speed_rad_s', 'mode', 'omega_rad_s', 'damping_ratio', 'whirl'],
            rows)
     return 0
+
+
+def _tell_unstable(case: Case, model: CoupledModel, highest: float) -> None:
+    """Say on standard error which modes grow on their own up to a speed [rad/s]."""
+    with _naming(case):
+        found = stability(model, (0.0, highest))
+    for text in (*unstable(found), *stability_doubts(found)):
+        print(f'{case.path}: {text}', file=sys.stderr)
 
 
 @contextmanager
@@ -55,8 +65,9 @@ def _naming(case: Case) -> Iterator[None]:
 
 
 def _criticals(
-    arguments: Namespace, model: CoupledModel, speed_range: tuple[float, float],
+    arguments: Namespace, case: Case, model: CoupledModel,
 ) -> int:
+    speed_range = case.speed_range
     if arguments.rpm is not None:
         low, high = arguments.rpm.start, arguments.rpm.stop
         if not low < high:
@@ -67,6 +78,7 @@ def _criticals(
         raise InputError(f'--running must be > 0 rpm, got {running:g}')
     with progress('solving') as _:
         criticals = critical_speeds(model, speed_range)
+    _tell_unstable(case, model, speed_range[1])
     header = ['speed_rad_s', 'whirl', 'damping_ratio']
     rows: list[tuple[float, ...]] = [
         (critical.speed, critical.whirl, critical.damping_ratio) for critical in criticals]

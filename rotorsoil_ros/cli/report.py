@@ -8,13 +8,20 @@ import time
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.summary import derived_quantities, undecided, warnings
+from rotorsoil_ros.case.summary import (
+    derived_quantities,
+    stability_doubts,
+    undecided,
+    unstable,
+    warnings,
+)
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.stability import Stability
 from rotorsoil_ros.monitor.peaks import resonances
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
@@ -36,11 +43,15 @@ def check(arguments: Namespace) -> int:
             criticals = [('critical speeds', 'not known, see the warning')]
             doubts = [undecided(case, error)]
     _print_table(derived_quantities(case, model.soil_models))
+    _print_table(_stability(table.stability))
     _print_table(criticals)
     _print_table(_peaks(case, table))
-    for warning in chain(doubts, warnings(case)):
+    for warning in chain(doubts, stability_doubts(table.stability), warnings(case)):
         print(f'warning: {warning}')
-    return 0
+    growing = list(unstable(table.stability))
+    for text in growing:
+        print(f'error: {text}')
+    return 1 if growing else 0
 
 
 def tabulate(arguments: Namespace) -> int:
@@ -69,6 +80,8 @@ def tabulate(arguments: Namespace) -> int:
                    f'{len(table.channels)} channels, {len(table.planes)} unbalance planes'),
         ('pieces', f'{len(table.pieces.resolved)} polynomials'),
         ('largest error', f'{table.accuracy:.2g} of the local amplitude, at unseen speeds'),
+        *(('unstable', f'{rad_s_to_rpm(left):.10g} to {rad_s_to_rpm(right):.10g} rpm: no steady '
+                       'response') for left, right in table.stability.unstable.tolist()),
         *(('gap', f'{rad_s_to_rpm(left):.10g} to {rad_s_to_rpm(right):.10g} rpm: resonance '
                   'without damping') for left, right in table.gaps),
         ('file', str(cache.Cache(directory).path('response', table.key))),
@@ -89,6 +102,20 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
     yield f'{block}: solves', f'{table.solves} of {table.unknowns} unknowns'
     yield f'{block}: largest error', f'{table.measured_error:.2g}, at unseen frequencies'
     yield f'{block}: file', str(cache.Cache(directory).path('compliance', models.key_of(soil)))
+
+
+def _stability(found: Stability) -> Iterable[tuple[str, str]]:
+    low, high = (rad_s_to_rpm(speed) for speed in found.span)
+    if found.doubt:
+        yield 'stability', 'not known, see the warning'
+    elif found.instabilities:
+        ranges = ', '.join(f'{rad_s_to_rpm(start):.6g} to {rad_s_to_rpm(end):.6g} rpm'
+                           for start, end in found.unstable.tolist())
+        yield 'stability', f'UNSTABLE, {ranges}: no steady response there, see the errors'
+    else:
+        how = 'no bearing gives energy' if not found.highest else (
+            f'every mode up to {rad_s_to_hz(found.highest):.4g} Hz decays')
+        yield 'stability', f'stable from {low:g} to {high:g} rpm: {how}'
 
 
 def _criticals(criticals: Sequence[CriticalSpeed]) -> list[tuple[str, str]]:

@@ -8,9 +8,10 @@ from typing import TextIO
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.cli.parser import Sweep
 from rotorsoil_ros.cli.progress import progress
@@ -18,6 +19,7 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.stability import Stability, stability
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
 # Rows computed together: bounds memory however long the sweep.
@@ -74,29 +76,51 @@ def response(arguments: Namespace) -> int:
     speed = (rpm_to_rad_s(values(arguments.rpm)) if arguments.hz is None
              else hz_to_rad_s(values(arguments.hz)))
 
+    growth = stability(model, (0.0, float(speed.max())))
+
     def rows(part: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        stable = growth.holds(part)
         if order is None:
-            return part[:, None], model.unbalance_response(part, case.unbalance).displacement
-        found = model.harmonic_response(part, order=order, channel=channel)
-        return part[:, None], found.displacement
+            found = model.unbalance_response(part[stable], case.unbalance).displacement
+        else:
+            found = model.harmonic_response(
+                part[stable], order=order, channel=channel).displacement
+        answers = np.full((len(part), len(model.channels)), complex(np.nan, np.nan))
+        answers[stable] = found
+        return part[:, None], answers
 
     _write(arguments.output, ['speed_rad_s'], model.channels, speed, rows)
-    return 0
+    return _told(case, growth, growth.holds(speed))
+
+
+def _told(case: Case, growth: Stability, stable: BoolArray) -> int:
+    """Say why rows have no numbers; return 1 if no row has any: nothing was answered."""
+    if stable.all():
+        return 0
+    for text in unstable(growth):
+        print(f'{case.path}: {text}: no steady response, NaN', file=sys.stderr)
+    return 0 if stable.any() else 1
 
 
 def frf(arguments: Namespace) -> int:
     """Write the displacement of every channel per unit force, at one speed of the rotor."""
-    model = _model(load(arguments.case, arguments.overrides), arguments)
+    case = load(arguments.case, arguments.overrides)
+    model = _model(case, arguments)
     _require_channel(model, arguments.force)
     speed = rpm_to_rad_s(arguments.rpm)
+    growth = stability(model, (speed, speed))
+    stable = growth.holds(np.array([speed]))
 
     def rows(part: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        if not stable.all():
+            return part[:, None], np.full((len(part), len(model.channels)),
+                                          complex(np.nan, np.nan))
         found = model.frequency_response(part, speed=speed, channel=arguments.force)
         return part[:, None], found.displacement
 
     _write(arguments.output, ['omega_rad_s'], model.channels,
            hz_to_rad_s(values(arguments.hz)), rows)
-    return 0
+    return _told(case, growth, stable)
 
 
 def _require_channel(model: CoupledModel, channel: str | None) -> None:

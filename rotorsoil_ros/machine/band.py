@@ -167,8 +167,8 @@ class ResponseBand:
         edges = np.append(edges[:-1:2], edges[-1])
         return cls((table, *(ResponseTable(
             table.channels, table.planes, table.transmits_force,
-            refine(_solver(model), edges, groups=model.groups, tolerance=_TOLERANCE), _TOLERANCE)
-            for model in models)))
+            refine(_solver(model), edges, groups=model.groups, tolerance=_TOLERANCE), _TOLERANCE,
+            table.stability) for model in models)))
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:
         """Return the band under one unbalance, (p,) [kg m]."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import across, Channel, DOFS, HOUSING, JOURNAL
-from rotorsoil_ros.errors import NotSolvedError, require, RotorSoilError
+from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, require, RotorSoilError
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupling import Answer, answer
 from rotorsoil_ros.machine.foundation import Foundation
@@ -17,6 +17,7 @@ from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.prediction import Prediction, Response
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.whirl import WhirlModes
+from rotorsoil_ros.units import rad_s_to_rpm
 
 # An unbalance at phase zero points up at t = 0 and moves toward +x: its force over (x, z),
 # per moment and squared speed (Lalanne & Ferraris, sec. 1.2.5).
@@ -292,6 +293,25 @@ class CoupledModel:
             found.ports[:, 2 * bearings:2 * stations], found.blocks], axis=1)
         return displacement, np.concatenate([
             interleave(found.through, found.through), found.into_soil], axis=1)
+
+    def within_tables(self, span: tuple[float, float]) -> tuple[float, float]:
+        """
+        Return the part of a span of speeds [rad/s] that all tables of bearings hold.
+
+        Raises
+        ------
+        OutOfTableError
+            If they hold none of it.
+
+        """
+        ranges = [bearing.speed_range for bearing in self.rotor.bearings]
+        low = max([span[0], *(first for first, _ in ranges)])
+        high = min([span[1], *(last for _, last in ranges)])
+        if not low <= high:
+            raise OutOfTableError(
+                f'tables of bearings must hold some speed of {rad_s_to_rpm(span[0]):g} to '
+                f'{rad_s_to_rpm(span[1]):g} rpm, there is none that all of them hold')
+        return low, high
 
     def bearing_coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return stiffness and damping of all bearings, (n, 2 b, 2 b) over (x, z) of each."""

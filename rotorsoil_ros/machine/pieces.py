@@ -1,7 +1,7 @@
 """The pieces into which a sharp function is cut so that polynomials can stand for it."""
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -49,6 +49,28 @@ class Pieces:
     edges: FloatArray
     resolved: BoolArray
     coefficients: ComplexArray
+
+    @classmethod
+    def joined(cls, parts: Sequence['Pieces'], span: tuple[float, float]) -> 'Pieces':
+        """Put pieces of rising ranges side by side; what of a span none of them has is open."""
+        width = parts[0].coefficients.shape[1:]
+        edges, resolved = [np.array(span[:1])], [np.zeros(0, dtype=bool)]
+        coefficients = [np.zeros((0, *width), dtype=complex)]
+        for part in parts:
+            if not len(part.resolved):
+                continue
+            if part.edges[0] > edges[-1][-1]:
+                edges.append(part.edges[:1])
+                resolved.append(np.zeros(1, dtype=bool))
+                coefficients.append(np.zeros((1, *width), dtype=complex))
+            edges.append(part.edges[1:])
+            resolved.append(part.resolved)
+            coefficients.append(part.coefficients)
+        if edges[-1][-1] < span[1]:
+            edges.append(np.array(span[1:]))
+            resolved.append(np.zeros(1, dtype=bool))
+            coefficients.append(np.zeros((1, *width), dtype=complex))
+        return cls(np.concatenate(edges), np.concatenate(resolved), np.concatenate(coefficients))
 
     @cached_property
     def _search(self) -> tuple[FloatArray, IntArray]:

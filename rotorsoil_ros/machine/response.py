@@ -1,6 +1,7 @@
 """What the machine answers at any speed, without solving again."""
 
 from dataclasses import dataclass, replace
+import math
 
 import numpy as np
 
@@ -8,7 +9,8 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.pieces import evaluate, evaluate_one, Pieces, refine
+from rotorsoil_ros.machine.pieces import DEGREE, evaluate, evaluate_one, Pieces, refine
+from rotorsoil_ros.machine.stability import Stability, stability
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.units import rad_s_to_rpm
 
@@ -49,7 +51,9 @@ class ResponseTable:
         squared speed.
     accuracy : float
         Largest deviation from the exact solution at speeds that the refinement has not seen,
-        relative to the local amplitude.
+        relative to the local amplitude; NaN where nothing is answered.
+    stability : Stability
+        Where a mode grows on its own: no piece is resolved there, as there is no steady response.
     key : str
         What identifies the computation in the cache; empty if it was not cached.
 
@@ -60,6 +64,7 @@ class ResponseTable:
     transmits_force: BoolArray
     pieces: Pieces
     accuracy: float
+    stability: Stability
     key: str = ''
 
     @classmethod
@@ -82,7 +87,7 @@ class ResponseTable:
         Raises
         ------
         NotSolvedError
-            If nothing can be resolved.
+            If nothing can be resolved of speeds at which the machine is stable.
 
         """
         low, high = speed_range
@@ -103,11 +108,18 @@ class ResponseTable:
             columns = rows.transpose(0, 2, 1)
             return columns[:, :planes], columns[:, planes:]
 
-        edges = np.linspace(low, high, _FIRST_PIECES + 1)
-        pieces = refine(solve, edges, groups=model.groups, tolerance=tolerance)
-        if not np.any(pieces.resolved):
+        # Before the response: where a mode grows on its own there is none to be refined.
+        growth = _growth(model, high)
+        nothing = np.zeros((0, DEGREE + 1, planes, len(model.groups)), dtype=complex)
+        parts = [Pieces(np.zeros(0), np.zeros(0, dtype=bool), nothing)]
+        for left, right in _stable_ranges(growth, low, high):
+            first = np.unique(np.append(np.linspace(low, high, _FIRST_PIECES + 1), [left, right]))
+            edges = first[(first >= left) & (first <= right)]
+            parts.append(refine(solve, edges, groups=model.groups, tolerance=tolerance))
+        pieces = Pieces.joined(parts, (low, high))
+        if len(parts) > 1 and not np.any(pieces.resolved):
             raise NotSolvedError('no part of the speed range could be interpolated')
-        table = cls(model.channels, model.planes, model.transmits_force, pieces, np.nan)
+        table = cls(model.channels, model.planes, model.transmits_force, pieces, np.nan, growth)
         return replace(table, accuracy=table.measure(model))
 
     @property
@@ -119,7 +131,7 @@ class ResponseTable:
     def gaps(self) -> FloatArray:
         """Intervals too close to an undamped resonance to be resolved, (g, 2) [rad/s]."""
         edges = np.stack([self.pieces.edges[:-1], self.pieces.edges[1:]], axis=1)
-        return edges[~self.pieces.resolved]
+        return edges[~self.pieces.resolved & self.stability.holds(edges.mean(axis=1))]
 
     def predictor(self, unbalance: ComplexArray) -> 'Predictor':
         """
@@ -152,12 +164,12 @@ class ResponseTable:
         speed = np.concatenate([
             low + (high - low) * share[:_CHECKS],
             edges[inner] + (edges[inner + 1] - edges[inner]) * share[_CHECKS:]])
-        worst = 0.0
+        worst = 0.0 if np.any(self.pieces.resolved) else math.nan
+        speed = speed[self.pieces.find(speed) >= 0]
         for plane in np.eye(len(self.planes), dtype=complex):
             predictor = self.predictor(plane)
-            seen = speed[predictor.covers(speed)]
-            exact = model.unbalance_response(seen, plane)
-            deviation = predictor.predict(seen).displacement - exact.displacement
+            exact = model.unbalance_response(speed, plane)
+            deviation = predictor.predict(speed).displacement - exact.displacement
             size = np.abs(exact.displacement)
             # Channels that do not move at all carry nothing but round-off.
             floor = 1e-9 * size.max(axis=1, keepdims=True, initial=0.0) + np.finfo(float).tiny
@@ -172,6 +184,7 @@ class ResponseTable:
             'transmits_force': self.transmits_force, 'edges': self.pieces.edges,
             'resolved': self.pieces.resolved, 'coefficients': self.pieces.coefficients,
             'accuracy': np.array(self.accuracy),
+            'stability': np.array(self.stability.to_json()),
         }
 
     @classmethod
@@ -184,7 +197,23 @@ class ResponseTable:
             tuple(str(name) for name in arrays['planes']),
             arrays['transmits_force'],
             Pieces(arrays['edges'], arrays['resolved'], arrays['coefficients']),
-            float(arrays['accuracy']), key)
+            float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])), key)
+
+
+def _growth(model: CoupledModel, high: float) -> Stability:
+    """Return where a mode grows, from rest to a speed; what cannot be told is a doubt."""
+    try:
+        return stability(model, (0.0, high))
+    except NotSolvedError as error:
+        return Stability((0.0, high), (), math.nan, doubt=str(error))
+
+
+def _stable_ranges(
+    growth: Stability, low: float, high: float,
+) -> list[tuple[float, float]]:
+    """Return the parts of a range of speeds [rad/s] in which no mode grows."""
+    ends = np.clip(np.concatenate([[low], growth.unstable.ravel(), [high]]), low, high)
+    return [(left, right) for left, right in ends.reshape(-1, 2).tolist() if left < right]
 
 
 @dataclass(frozen=True)
@@ -266,6 +295,10 @@ class Predictor:
 
     def _not_covered(self, speed: float) -> OutOfTableError:
         low, high = self.table.speed_range
+        if low <= speed <= high and not self.table.stability.holds(np.array([speed]))[0]:
+            return OutOfTableError(
+                f'speed must be one at which the machine is stable, got {rad_s_to_rpm(speed):g} '
+                'rpm: a vibration grows there, no steady response exists')
         return OutOfTableError(
             f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and off '
             f'undamped resonances, got {rad_s_to_rpm(speed):g} rpm')

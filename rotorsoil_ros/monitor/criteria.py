@@ -15,6 +15,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
@@ -74,12 +75,13 @@ class Expectation:
         table = models.response_table(case, model, directory)
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
         band = models.response_band(case, model, table, spread)
-        note = ''
+        notes = list(unstable(table.stability))
         try:
             modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
         except NotSolvedError as error:
-            modes, note = (), f'critical speeds of the model are not known: {error}'
-        return cls(case, model, table, modes, band, spread, note)
+            modes = ()
+            notes.append(f'critical speeds of the model are not known: {error}')
+        return cls(case, model, table, modes, band, spread, '; '.join(notes))
 
     @property
     def criticals(self) -> tuple[CriticalSpeed, ...]:
@@ -89,8 +91,9 @@ class Expectation:
 
     @property
     def resonances(self) -> list[Resonance]:
-        """Critical speeds and damping ratios, those that are unstable without damping."""
-        return [Resonance(mode.speed, max(mode.damping_ratio, 0.0)) for mode in self.modes]
+        """Critical speeds and damping ratios of modes that decay: others have no steady peak."""
+        return [Resonance(mode.speed, mode.damping_ratio) for mode in self.modes
+                if mode.damping_ratio >= 0.0]
 
     def lowest_natural_speed(self, axis: str) -> float:
         """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""

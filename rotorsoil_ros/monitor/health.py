@@ -7,7 +7,8 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.events import Diagnostics, Level, NANOSECONDS
 from rotorsoil_ros.units import rad_s_to_rpm
 
-GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unresolved')
+GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unstable',
+        'unresolved')
 FAULTS = (*GAPS, 'malformed', 'velocity_missing')
 STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
 COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *STAMPS, 'measured', 'samples')
@@ -23,6 +24,7 @@ class Health:
         self.level = Level.STALE
         self.last_speed = math.nan
         self.publishers = 1
+        self.standing = ''  # an error of the case itself, whatever comes in
         self._last_ns: int | None = None
         self._faults = 0
         self._at_tick = self.counts.copy()
@@ -49,6 +51,8 @@ class Health:
     @property
     def has_news(self) -> bool:
         """Whether the last speed must not wait for the next tick: a fault, or a return."""
+        if self.standing:
+            return False
         return self.level is not Level.WARN if self._faults else self.level is Level.STALE
 
     def begin(self, now_ns: int) -> None:
@@ -57,8 +61,12 @@ class Health:
 
     def announce(self, now_ns: int) -> Diagnostics:
         """Tell a change between two ticks; rate and silence are still those of the last one."""
-        self.level = Level.WARN if self._faults else Level.OK
+        self.level = self._raised(Level.WARN if self._faults else Level.OK)
         return self._report(now_ns)
+
+    def _raised(self, level: Level) -> Level:
+        """Return a level, or ERROR where the case itself has one."""
+        return Level.ERROR if self.standing else level
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> Diagnostics:
         """Close the period that began at the last tick, judge it and report it."""
@@ -73,6 +81,7 @@ class Health:
         else:
             is_well = not self._faults and self.publishers < 2
             self.level = Level.OK if is_well else Level.WARN
+        self.level = self._raised(self.level)
         report = self._report(now_ns)
         self._tick_ns, self._at_tick, self._faults = now_ns, self.counts.copy(), 0
         return report
@@ -92,6 +101,8 @@ class Health:
 
     def _summary(self) -> str:
         """Say in one sentence what the level rests on."""
+        if self.standing:
+            return self.standing
         if self.level is Level.STALE:
             if not self.counts['received']:
                 return 'waiting for the first speed'

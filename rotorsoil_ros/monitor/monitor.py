@@ -6,8 +6,19 @@ from dataclasses import replace
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.errors import OutOfTableError
-from rotorsoil_ros.events import Diagnostics, Event, Measured, Model, Predicted, Samples, Sink
+from rotorsoil_ros.events import (
+    Diagnostics,
+    Event,
+    Level,
+    Measured,
+    Model,
+    Predicted,
+    Remark,
+    Samples,
+    Sink,
+)
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.monitor.health import Health
 from rotorsoil_ros.monitor.judge import Judge, Judging
@@ -31,6 +42,7 @@ class Monitor:
         self.machine = machine
         self.table = table
         self.health = Health(machine, table.speed_range)
+        self.health.standing = '; '.join(unstable(table.stability))
         self._sinks = tuple(sinks)
         self._predictor = table.predictor(unbalance)
         self.judge = Judge(machine, self._predictor, judging or Judging())
@@ -68,6 +80,7 @@ class Monitor:
         self.judge = Judge(self.machine, self._predictor, judging or Judging())
         self.table, self._sinks = table, tuple(sinks)
         self.health.speed_range = table.speed_range
+        self.health.standing = '; '.join(unstable(table.stability))
 
     def on_measured(self, measured: Measured) -> None:
         """Hand on what a measuring system says about this machine."""
@@ -89,6 +102,8 @@ class Monitor:
     def describe(self, now_ns: int, description: Mapping[str, object]) -> None:
         """Say what the predictions rest on from now on."""
         self._emit(Model(self.machine, now_ns, description))
+        for text in unstable(self.table.stability):
+            self._emit(Remark(self.machine, now_ns, Level.ERROR, text))
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> None:
         """Report the health of the machine over the time since the last tick."""
@@ -131,6 +146,8 @@ class Monitor:
         reasons['negative'] = finite & (speed < 0.0)
         reasons['below_table'] = finite & (speed >= 0.0) & (speed < lowest)
         reasons['above_table'] = finite & (speed > highest)
+        inside = finite & (speed >= lowest) & (speed <= highest)
+        reasons['unstable'] = inside & ~self.table.stability.holds(speed)
         known = np.logical_or.reduce(list(reasons.values()))
         reasons['unresolved'] = ~known
         return reasons

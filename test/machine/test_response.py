@@ -49,8 +49,26 @@ def deviation(table, model, speed, unbalance):
 def test_table_is_right_at_unseen_speeds(model):
     table = ResponseTable.build(model, RANGE)
     speed = np.random.default_rng(1).uniform(*RANGE, size=2000)
-    assert deviation(table, model, speed, UNBALANCE) < PROMISED
+    stable = table.stability.holds(speed)
+    np.testing.assert_array_equal(table.predictor(UNBALANCE).covers(speed), stable)
+    assert stable.any()
+    assert deviation(table, model, speed[stable], UNBALANCE) < PROMISED
     assert table.accuracy < PROMISED
+
+
+def test_unstable_speeds_have_no_answer_and_are_no_gaps():
+    # 5e7 N/m of cross-coupling: a mode of the cross-coupled blocks grows at high speeds.
+    table = ResponseTable.build(two_blocks(cross=5e7), RANGE)
+    (low, high), = table.stability.unstable.tolist()
+    assert RANGE[0] < low < high == RANGE[1]
+    assert len(table.gaps) == 0
+    predictor = table.predictor(UNBALANCE)
+    assert predictor.covers(np.array([0.999 * low, 1.001 * low, high])).tolist() == [
+        True, False, False]
+    with pytest.raises(OutOfTableError, match='a vibration grows there'):
+        predictor.predict(np.array([1.001 * low]))
+    again = ResponseTable.from_arrays(table.to_arrays(), table.channels)
+    assert again.stability == table.stability
 
 
 def resonances(model, count):

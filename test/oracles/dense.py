@@ -129,9 +129,10 @@ def dense_eigenvalues(
     # In units of time in which stiffness and mass are alike: digits.
     unit = np.sqrt(np.linalg.norm(k) / np.linalg.norm(m)) ** 0.5
     size, one = len(k), np.eye(len(k))
-    values = unit * scipy.linalg.eigvals(
-        np.block([[np.zeros((size, size)), one], [-k / unit**2, -c / unit]]),
-        scipy.linalg.block_diag(one, m))
+    with np.errstate(invalid='ignore'):  # what has no mass has infinite eigenvalues
+        values = unit * scipy.linalg.eigvals(
+            np.block([[np.zeros((size, size)), one], [-k / unit**2, -c / unit]]),
+            scipy.linalg.block_diag(one, m))
     values = values[np.isfinite(values) & (values.imag > 1e-9 * np.abs(values))]
     return np.asarray(values[np.argsort(values.imag)])
 

@@ -1,0 +1,193 @@
+"""What can feed a vibration: bearings and pedestals that give energy, and how fast at most."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+import math
+
+import numpy as np
+import scipy.linalg
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.pencil import Pencil, Vibrations
+from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
+from rotorsoil_ros.rotor.whirl import held
+
+# Cross terms that differ by less than this share of all coefficients are symmetric.
+_ROUND_OFF = 1e-12
+
+# The soil is passive: what seems to give more than this of all power is a slip of its fit.
+_ARTEFACT = 1e-3
+
+# Share of the largest 1 / omega^2 below which a mode of the mesh has no mass.
+_MASSLESS = 1e-13
+
+CAUSES = ('cross-coupled stiffness', 'negative damping', 'negative stiffness')
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """Smallest and largest 2 x 2 coefficients over (x, z) between two points of a table."""
+
+    least: FloatArray
+    most: FloatArray
+
+    @property
+    def lowest_eigenvalue(self) -> float:
+        """Lower bound of the eigenvalues of the symmetric part (Gershgorin)."""
+        across = max(abs(self.least[0, 1] + self.least[1, 0]),
+                     abs(self.most[0, 1] + self.most[1, 0]))
+        return float(min(self.least[0, 0], self.least[1, 1]) - 0.5 * across)
+
+    @property
+    def skew(self) -> float:
+        """Upper bound of half the difference of the cross terms."""
+        size = max(float(np.abs(self.least).max()), float(np.abs(self.most).max()))
+        skew = 0.5 * max(abs(self.most[0, 1] - self.least[1, 0]),
+                         abs(self.least[0, 1] - self.most[1, 0]))
+        return float(skew) if skew > _ROUND_OFF * size else 0.0
+
+
+def highest_fed(model: CoupledModel, span: tuple[float, float]) -> float:
+    """
+    Return below which |lambda| any growing vibration lies, at speeds in a span [rad/s].
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    span : tuple of two floats
+        Rotor speeds [rad/s].
+
+    Returns
+    -------
+    float
+        [rad/s]; 0 where nothing gives energy, so that no vibration can grow; infinite where a
+        damper that takes nothing sets no bound.
+
+    Notes
+    -----
+    The equations of motion times conj(lambda) v^H have the real part
+
+        |l|^2 s m + |l|^2 c + s k + w q + (what the passive rest takes) = 0,   l = s + i w,
+
+    with m, c, k the symmetric matrices in the shape v and q half the difference of the cross
+    terms. With s > 0 a bearing can only balance it while |l| c < |q| + max(-k, 0).
+
+    """
+    highest = 0.0
+    for stiffness, damping in _of_everything(model, span):
+        lowest = damping.lowest_eigenvalue
+        gives = stiffness.skew + max(-stiffness.lowest_eigenvalue, 0.0)
+        if gives > 0.0 or lowest < 0.0:
+            highest = max(highest, gives / lowest if lowest > 0.0 else math.inf)
+    return highest
+
+
+def fastest(model: CoupledModel) -> float:
+    """Return a frequency above all modes of the rotor's mesh [rad/s]."""
+    stiffness, mass, _ = held(model.rotor, model.nominal_springs)
+    values = scipy.linalg.eigh(mass, stiffness, eigvals_only=True)
+    return float(2.0 / math.sqrt(values[values > _MASSLESS * values[-1]].min()))
+
+
+def _of_everything(
+    model: CoupledModel, span: tuple[float, float],
+) -> Iterator[tuple[_Range, _Range]]:
+    for bearing in model.rotor.bearings:
+        yield from _of_bearing(bearing, span)
+        if bearing.pedestal is not None:
+            stiffness, damping = bearing.pedestal.stiffness, bearing.pedestal.damping
+            yield _Range(stiffness, stiffness), _Range(damping, damping)
+
+
+def _of_bearing(
+    bearing: Bearing, span: tuple[float, float],
+) -> Iterator[tuple[_Range, _Range]]:
+    points = np.sort(np.concatenate([np.array(span), knots(bearing, span)]))
+    for left, right in pairwise(points.tolist()):
+        yield (_between(bearing.stiffness, left, right), _between(bearing.damping, left, right))
+
+
+def _between(matrix: FloatArray | SpeedTable, left: float, right: float) -> _Range:
+    if not isinstance(matrix, SpeedTable):
+        return _Range(matrix, matrix)
+    # A monotone cubic stays between its points.
+    both = matrix(np.clip(np.array([left, right]), matrix.speed[0], matrix.speed[-1]))
+    return _Range(both.min(axis=0), both.max(axis=0))
+
+
+def knots(bearing: Bearing, span: tuple[float, float]) -> FloatArray:
+    """Return the speeds inside a span at which tables of a bearing have points [rad/s]."""
+    own = [matrix.speed for matrix in (bearing.stiffness, bearing.damping)
+           if isinstance(matrix, SpeedTable)]
+    speeds = np.unique(np.concatenate([np.zeros(0), *own]))
+    return speeds[(speeds > span[0]) & (speeds < span[1])]
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """
+    What one bearing or pedestal gives to a vibration.
+
+    Attributes
+    ----------
+    name : str
+        Of the bearing, or `pedestal of` it.
+    share : float
+        Of all that is given [-].
+    cause : str
+        One of `CAUSES`.
+
+    """
+
+    name: str
+    share: float
+    cause: str
+
+
+def feeds(pencil: Pencil, vibrations: Vibrations, index: int) -> tuple[Feed, ...]:
+    """Return what gives energy to a vibration, most first; nothing if its soil seems to."""
+    w = complex(vibrations.frequency[index])
+    rotor, support, load = (pencil.part(vibrations, index, name)
+                            for name in ('rotor', 'support', 'load'))
+    gap = pencil.journals @ rotor - pencil.rows @ support
+    stiffness, rates = (part[0] for part in pencil.springs(np.array([vibrations.speed])))
+    damping = (rates / (1j * pencil.unit)).real
+    blocks = 6 * len(pencil.model.foundations)
+    terms = [(bearing.name, _taken(w, gap[pair], stiffness.real[pair, pair], damping[pair, pair]))
+             for bearing, pair in zip(pencil.model.rotor.bearings, _pairs(0), strict=False)]
+    deflection = support * pencil.solver.compliance.size
+    terms += [(f'the pedestal of {bearing.name}',
+               _taken(w, deflection[pair], bearing.pedestal.stiffness, bearing.pedestal.damping))
+              for bearing, pair in zip((one for one in pencil.model.rotor.bearings
+                                        if one.pedestal is not None), _pairs(blocks),
+                                       strict=False) if bearing.pedestal is not None]
+    soil = float((np.conj(1j * w) * np.vdot(support[:blocks], load[:blocks])).real)
+    total = sum(float(np.abs(taken).sum()) for _, taken in terms)
+    if not total > 0.0 or soil < -_ARTEFACT * (total + abs(soil)):
+        return ()
+    given = [(name, -float(taken.sum()), CAUSES[int(taken.argmin())])
+             for name, taken in terms if taken.sum() < 0.0]
+    whole = sum(power for _, power, _ in given)
+    return tuple(Feed(name, power / whole, cause) for name, power, cause
+                 in sorted(given, key=lambda one: -one[1]))
+
+
+def _pairs(first: int) -> Iterator[slice]:
+    place = first
+    while True:
+        yield slice(place, place + 2)
+        place += 2
+
+
+def _taken(
+    w: complex, gap: ComplexArray, stiffness: FloatArray, damping: FloatArray,
+) -> FloatArray:
+    """Return what cross-coupling, damping and stiffness take of a vibration exp(i w t), (3,)."""
+    skew = 0.5 * (stiffness - stiffness.T) / 1j
+    return np.array([
+        w.real * np.vdot(gap, skew @ gap).real,
+        abs(w) ** 2 * np.vdot(gap, 0.5 * (damping + damping.T) @ gap).real,
+        -w.imag * np.vdot(gap, 0.5 * (stiffness + stiffness.T) @ gap).real])
