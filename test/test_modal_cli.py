@@ -28,6 +28,8 @@ def table_of(capsys, *arguments):
     """Return the CSV that a verb prints, as its header and an array."""
     assert main([*arguments]) == 0
     header, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
+    if header[-1] == 'name':
+        header, rows = header[:-1], [row[:-1] for row in rows]
     return header, np.array(rows, dtype=float)
 
 
@@ -127,13 +129,43 @@ def test_criticals_of_the_rigid_machine_are_those_of_the_design_note(capsys):
 def test_margins_of_a_running_speed_come_on_request(capsys):
     header, rows = table_of(capsys, 'campbell', PAPER, '--criticals', '--running', '3000',
                             '--rpm', '2000:9000:2')
-    assert header[3:] == ['amplification_factor', 'separation_margin', 'required_margin']
+    assert header[3:] == ['amplification_factor', 'separation_margin', 'required_margin',
+                          'half_power_factor']
     np.testing.assert_allclose(rows[:, 3], 0.5 / rows[:, 2])
     np.testing.assert_allclose(rows[:, 4], np.abs(rows[:, 0] / (100.0 * np.pi) - 1.0))
     # min(17 (1 - 1 / (AF - 1.5)), 16) below, min(10 + 17 (1 - 1 / (AF - 1.5)), 26) above
-    share = np.minimum(0.17 * (1.0 - 1.0 / (rows[:, 3] - 1.5)), 0.16)
+    factor = np.fmax(rows[:, 3], rows[:, 6])
+    share = np.minimum(0.17 * (1.0 - 1.0 / (factor - 1.5)), 0.16)
     required = share + 0.1 * (rows[:, 0] > 100.0 * np.pi)
-    np.testing.assert_allclose(rows[:, 5], np.where(rows[:, 3] < 2.5, 0.0, required))
+    np.testing.assert_allclose(rows[:, 5], np.where(factor < 2.5, 0.0, required))
+
+
+def test_a_critical_speed_just_beyond_the_range_is_told_with_its_margin(capsys):
+    # The second mode of the rigid machine, 48.86 Hz = 2931.6 rpm, lies 1.6 % above 2885 rpm.
+    _, rows = table_of(capsys, 'campbell', PAPER, '--criticals', '--running', '2885', '--set',
+                       'support.model=rigid', '--set', 'speed_range_rpm=[600, 2885]')
+    forward = rows[rows[:, 1] > 0.0]
+    assert len(forward) == 1
+    np.testing.assert_allclose(forward[0, 4], 0.0162, atol=2e-4)
+    np.testing.assert_allclose(forward[0, 5], 0.26)
+
+
+def test_no_critical_speed_is_said_with_how_far_was_looked(capsys):
+    arguments = ['campbell', PAPER, '--criticals', '--rpm', '100:1000:2']
+    assert main(arguments) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines() == ['speed_rad_s,whirl,damping_ratio,name']
+    assert 'no critical speed from 100 up to 1000 rpm' in said.err
+    assert main([*arguments, '--running', '900']) == 0
+    assert 'no critical speed from 100 up to 1134 rpm' in capsys.readouterr().err
+
+
+def test_margins_end_where_the_tables_of_bearings_end_and_that_is_said(capsys):
+    fan = str(Path(__file__).parent / 'cases' / 'fan_table' / 'case.yaml')
+    assert main(['campbell', fan, '--criticals', '--running', '1500']) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[1].endswith(',block rocking across')
+    assert 'from 100 to 1800 rpm only: tables of bearings end there; margins' in said.err
 
 
 @pytest.mark.parametrize('arguments, problem', [

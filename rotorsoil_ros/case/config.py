@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -244,17 +244,21 @@ class _Builder:
     def _zones(self) -> ZoneLimits:
         """Return the limits of a group, or those that the file gives itself."""
         entry = self.faults.entries.zones or schema.Zones()
-        own = entry.label, entry.rigid, entry.flexible
-        if entry.group is not None and own != (None, None, None):
+        own = (entry.label, entry.rigid, entry.flexible, entry.rigid_displacement,
+               entry.flexible_displacement)
+        given = any(part is not None for part in own)
+        if entry.group is not None and given:
             raise self.faults.error('zones', problem='needs either group, or label, rigid and '
                                                      'flexible, got both')
-        label, rigid, flexible = own
-        if label is None and rigid is None and flexible is None:
-            return ISO_10816_3[entry.group or USUAL_GROUP]
-        if label is None or rigid is None or flexible is None:
-            raise self.faults.error('zones', problem='needs label, rigid and flexible together')
         with self.faults.at('zones', entry=entry):
-            return ZoneLimits(label, rigid, flexible)
+            if not given:
+                return replace(ISO_10816_3[entry.group or USUAL_GROUP], baseline=entry.baseline)
+            label, rigid, flexible, *displacements = own
+            if label is None or rigid is None or flexible is None:
+                raise self.faults.error('zones', problem='needs label, rigid and flexible '
+                                                         'together')
+            return ZoneLimits(label, rigid, flexible, displacements[0], displacements[1],
+                              entry.baseline)
 
     def _speed_range(self) -> tuple[float, float]:
         low, high = self.faults.entries.speed_range_rpm

@@ -250,6 +250,7 @@ class Uncertainty(Entry):
 
 
 Velocities: TypeAlias = tuple[MetrePerSecond, MetrePerSecond, MetrePerSecond]
+Displacements: TypeAlias = tuple[Metre, Metre, Metre]
 
 
 class Zones(Entry):
@@ -259,6 +260,9 @@ class Zones(Entry):
     label: Annotated[str, StringConstraints(min_length=1, max_length=64)] | None = None
     rigid: Velocities | None = None
     flexible: Velocities | None = None
+    rigid_displacement: Displacements | None = None
+    flexible_displacement: Displacements | None = None
+    baseline: MetrePerSecond | None = None
 
 
 class Document(Entry):

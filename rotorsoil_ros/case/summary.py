@@ -135,6 +135,15 @@ def unstable(found: Stability) -> Iterator[str]:
         yield f'unstable {where}: {one.name} ({how}) grows, fed by {fed}'
 
 
+def clipped(span: tuple[float, float], wanted: tuple[float, float]) -> list[str]:
+    """Return a remark where tables of bearings end before speeds [rad/s] that are looked at."""
+    if wanted[0] >= span[0] and wanted[1] <= span[1]:
+        return []
+    low, high = (rad_s_to_rpm(speed) for speed in span)
+    return [f'critical speeds are looked for from {low:g} to {high:g} rpm only: tables of '
+            'bearings end there']
+
+
 def stability_doubts(found: Stability) -> Iterator[str]:
     """Yield what is not known of the stability of a machine."""
     if found.doubt:

@@ -19,7 +19,7 @@ _ZONES: tuple[Zone, ...] = ('A', 'B', 'C', 'D')
 @dataclass(frozen=True, slots=True)
 class ZoneLimits:
     """
-    Boundaries A/B, B/C and C/D of housing velocity.
+    Boundaries A/B, B/C and C/D of housing vibration.
 
     Attributes
     ----------
@@ -27,29 +27,83 @@ class ZoneLimits:
         Where the figures come from.
     rigid, flexible : tuple of three floats
         Root mean square [m/s] for the two support classes.
+    rigid_displacement, flexible_displacement : tuple of three floats or None
+        The same of displacement [m]: of both the stricter holds. None is no limit.
+    baseline : float or None
+        What the machine vibrates with when it is well [m/s], from which an alarm is set.
 
     """
 
     label: str
     rigid: tuple[float, float, float]
     flexible: tuple[float, float, float]
+    rigid_displacement: tuple[float, float, float] | None = None
+    flexible_displacement: tuple[float, float, float] | None = None
+    baseline: float | None = None
 
     def __post_init__(self) -> None:
-        for name, limits in (('rigid', self.rigid), ('flexible', self.flexible)):
-            if not 0.0 < limits[0] < limits[1] < limits[2] < math.inf:
-                raise RotorSoilError(f'{name} must be three rising velocities > 0 m/s, '
-                                     f'got {limits}')
+        for name, limits, unit in (
+                ('rigid', self.rigid, 'velocities > 0 m/s'),
+                ('flexible', self.flexible, 'velocities > 0 m/s'),
+                ('rigid_displacement', self.rigid_displacement, 'displacements > 0 m'),
+                ('flexible_displacement', self.flexible_displacement, 'displacements > 0 m')):
+            if limits is not None and not 0.0 < limits[0] < limits[1] < limits[2] < math.inf:
+                raise RotorSoilError(f'{name} must be three rising {unit}, got {limits}')
+        if self.baseline is not None and not 0.0 < self.baseline < math.inf:
+            raise RotorSoilError(f'baseline must be > 0 m/s and finite, got {self.baseline:g}')
 
-    def of(self, support: SupportClass) -> tuple[float, float, float]:
-        """Return the boundaries [m/s] for one class of support."""
-        return self.rigid if support == 'rigid' else self.flexible
+    def of(self, support: SupportClass, speed: float = math.inf) -> tuple[float, float, float]:
+        """
+        Return the boundaries [m/s] for one class of support.
+
+        Parameters
+        ----------
+        support : str
+            `rigid` or `flexible`.
+        speed : float
+            Of the rotor, with which the housing vibrates [rad/s]: a displacement d is a velocity
+            of speed times d, which is the stricter one of slow machines.
+
+        """
+        velocities, displacements = (
+            (self.rigid, self.rigid_displacement) if support == 'rigid'
+            else (self.flexible, self.flexible_displacement))
+        if displacements is None:
+            return velocities
+        first, second, third = (min(velocity, speed * displacement) for velocity, displacement
+                                in zip(velocities, displacements, strict=True))
+        return first, second, third
+
+    def alarm(self, support: SupportClass, speed: float = math.inf) -> float:
+        """
+        Return the velocity that is an alarm [m/s rms].
+
+        References
+        ----------
+        ISO 20816-1: a quarter of boundary B/C above the baseline, and not more than 1.25 times
+        that boundary; without a baseline the boundary itself.
+
+        """
+        _, boundary, _ = self.of(support, speed)
+        if self.baseline is None:
+            return boundary
+        return min(self.baseline + _ABOVE_BASELINE * boundary, _MOST * boundary)
+
+    def trip(self, support: SupportClass, speed: float = math.inf) -> float:
+        """Return the velocity at which to stop [m/s rms], 1.25 times boundary C/D at most."""
+        return _MOST * self.of(support, speed)[2]
 
 
+# Of the boundaries B/C and C/D: how far an alarm lies above a baseline, and the most it may be.
+_ABOVE_BASELINE, _MOST = 0.25, 1.25
+
+# From published charts of the standard, not from its text; displacement and velocity of one row
+# meet at 12.5 Hz (group 1) and at 10 Hz (group 2).
 ISO_10816_3 = {
     1: ZoneLimits('ISO 10816-3:2009 group 1', (2.3e-3, 4.5e-3, 7.1e-3),
-                  (3.5e-3, 7.1e-3, 11.0e-3)),
+                  (3.5e-3, 7.1e-3, 11.0e-3), (29e-6, 57e-6, 90e-6), (45e-6, 90e-6, 140e-6)),
     2: ZoneLimits('ISO 10816-3:2009 group 2', (1.4e-3, 2.8e-3, 4.5e-3),
-                  (2.3e-3, 4.5e-3, 7.1e-3)),
+                  (2.3e-3, 4.5e-3, 7.1e-3), (22e-6, 45e-6, 71e-6), (37e-6, 71e-6, 113e-6)),
 }
 USUAL_GROUP = 2
 

@@ -1,7 +1,7 @@
 """What a case is, and what has been computed of it, in words."""
 
 from argparse import Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 import time
@@ -9,6 +9,7 @@ import time
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.summary import (
+    clipped,
     derived_quantities,
     stability_doubts,
     undecided,
@@ -19,7 +20,10 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
-from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.margins import asked
+from rotorsoil_ros.machine.mode_names import ModeNames
+from rotorsoil_ros.machine.modes import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.stability import Stability
 from rotorsoil_ros.monitor.peaks import resonances
@@ -37,7 +41,7 @@ def check(arguments: Namespace) -> int:
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
         try:
-            criticals, doubts = _criticals(critical_speeds(model, case.speed_range)), []
+            criticals, doubts = _criticals(case, model)
         except NotSolvedError as error:
             # The machine can be answered for all the same: its response needs no modes.
             criticals = [('critical speeds', 'not known, see the warning')]
@@ -118,13 +122,28 @@ def _stability(found: Stability) -> Iterable[tuple[str, str]]:
         yield 'stability', f'stable from {low:g} to {high:g} rpm: {how}'
 
 
-def _criticals(criticals: Sequence[CriticalSpeed]) -> list[tuple[str, str]]:
-    lines = [(f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
-              f'{"forward" if critical.whirl > 0 else "backward"}, '
-              f'damping ratio {critical.damping_ratio:.2g}'
-              + ('' if critical.amplification_factor >= _FELT else ', hardly felt'))
-             for critical in criticals]
-    return lines or [('critical speeds', 'none in the speed range')]
+def _criticals(
+    case: Case, model: CoupledModel,
+) -> tuple[list[tuple[str, str]], list[str]]:
+    """Return every critical speed to which the speed range has to keep a margin, and doubts."""
+    low, high = case.speed_range
+    wanted = low, asked(high)[1]
+    span = model.within_tables(wanted)
+    names, lines = ModeNames(model), []
+    for critical in critical_speeds(model, span):
+        how = [f'{"forward" if critical.whirl > 0 else "backward"}',
+               f'damping ratio {critical.damping_ratio:.2g}']
+        if critical.amplification_factor < _FELT:
+            how.append('hardly felt')
+        if critical.speed > high:
+            how.append(f'{critical.speed / high - 1.0:.1%} above the speed range, '
+                       f'{critical.required_margin(high):.0%} is asked')
+        lines.append((f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
+                      f'{", ".join(how)}, {names.of_critical(critical)}'))
+    if not lines:
+        lines.append(('critical speeds', f'none from {rad_s_to_rpm(span[0]):g} up to '
+                                         f'{rad_s_to_rpm(span[1]):.6g} rpm'))
+    return lines, clipped(span, wanted)
 
 
 def _peaks(case: Case, table: ResponseTable) -> Iterable[tuple[str, str]]:

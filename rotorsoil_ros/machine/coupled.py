@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.channel import across, Channel, DOFS, HOUSING, JOURNAL
+from rotorsoil_ros.channel import ACROSS, across, Channel, DOFS, HOUSING, JOURNAL
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, require, RotorSoilError
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupling import Answer, answer
@@ -25,6 +25,10 @@ UNBALANCE_FORCE = np.array([-1j, 1.0])
 
 # Speeds that are solved together: bounds memory, yet is long enough to hide Python.
 _CHUNK = 1024
+
+# A mode belongs to a direction if this share of the housings' motion is in it.
+_IN_DIRECTION = 0.1
+_STILL = 1e-9
 
 # Bytes of a block that is taken and given back untouched before a sweep: from then on the C
 # library keeps what is freed up to that size, where it would return every temporary array above
@@ -293,6 +297,51 @@ class CoupledModel:
             found.ports[:, 2 * bearings:2 * stations], found.blocks], axis=1)
         return displacement, np.concatenate([
             interleave(found.through, found.through), found.into_soil], axis=1)
+
+    def lowest_natural_frequency(self, axis: str, highest: float) -> float:
+        """
+        Return the lowest frequency of machine and support in a direction, the rotor being rigid.
+
+        Parameters
+        ----------
+        axis : str
+            `x` or `z`, in which the housings move.
+        highest : float
+            Up to which to look, as far as the soil is known [rad/s].
+
+        Returns
+        -------
+        float
+            [rad/s]; infinite where there is none, as on a rigid support.
+
+        References
+        ----------
+        ISO 20816-1: the class of a support goes by the lowest natural frequency of the combined
+        machine and support in the direction of measurement; shaft bending is none of it.
+
+        """
+        column = ACROSS.index(axis)
+        frequency, motion = self.support.natural_frequencies(self._riding_mass, highest)
+        power = np.abs(motion).reshape(len(motion), len(self.rotor.bearings), 2) ** 2
+        total = power.sum(axis=(1, 2))
+        # A block that slides along the shaft moves no housing across it, but for round-off.
+        moves = ((power[..., column].sum(axis=1) >= _IN_DIRECTION * total)
+                 & (total > _STILL * total.max(initial=0.0)))
+        return float(frequency[moves].min(initial=math.inf))
+
+    @cached_property
+    def _riding_mass(self) -> FloatArray:
+        """Mass of the rotor as a rigid body on its housings, (2 b, 2 b) [kg]."""
+        rotor = self.rotor
+        _, mass, _ = rotor.plane_matrices
+        places = rotor.node_positions
+        rigid = np.stack([np.column_stack([np.ones_like(places), np.zeros_like(places)]).ravel(),
+                          np.column_stack([places, np.ones_like(places)]).ravel()], axis=1)
+        seats = np.array([[1.0, bearing.position] for bearing in rotor.bearings])
+        # Of three bearings and more the line that fits best.
+        follows = np.linalg.pinv(seats)
+        plane = follows.T @ (rigid.T @ mass @ rigid) @ follows
+        return np.kron(plane, np.eye(2))
 
     def within_tables(self, span: tuple[float, float]) -> tuple[float, float]:
         """

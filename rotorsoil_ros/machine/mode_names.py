@@ -9,6 +9,7 @@ import scipy.linalg
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes import CriticalSpeed
 from rotorsoil_ros.rotor.whirl import held
 
 # Motion of a block over (x, y, z, rx, ry, rz): the shaft points along y.
@@ -90,6 +91,11 @@ class ModeNames:
         motions = {place: energy for place, energy in energies.items()
                    if place in self._dofs and place.partition(' ')[0] == body}
         return max(motions, key=lambda place: motions[place]) if motions else body
+
+    def of_critical(self, critical: CriticalSpeed) -> str:
+        """Return the name of the mode at a critical speed."""
+        return self.of(critical.deflection, critical.support, frequency=critical.speed,
+                       speed=critical.speed)
 
     @cached_property
     def _dofs(self) -> frozenset[str]:

@@ -33,6 +33,9 @@ _STILL = 1e-9
 _FOUND = 1e-12
 _STEPS = 40
 
+# Separation margins that API 617 asks at most of criticals below and above a running speed.
+MARGIN_BELOW, MARGIN_ABOVE = 0.16, 0.26
+
 
 @dataclass(frozen=True)
 class Campbell:
@@ -169,9 +172,17 @@ class CriticalSpeed:
         """Return the distance from a running speed [rad/s], as a share of that speed."""
         return abs(self.speed - running) / running
 
-    def required_margin(self, running: float) -> float:
+    def required_margin(self, running: float, *, half_power: float = math.nan) -> float:
         """
-        Return the separation margin that a running speed [rad/s] needs.
+        Return the separation margin that a running speed needs.
+
+        Parameters
+        ----------
+        running : float
+            Speed [rad/s].
+        half_power : float
+            Amplification factor by the response, as `half_power_factors` has it; of it and
+            that by the damping ratio the larger counts.
 
         References
         ----------
@@ -181,11 +192,11 @@ class CriticalSpeed:
         percent, whichever is less.
 
         """
-        factor = self.amplification_factor
+        factor = float(np.fmax(self.amplification_factor, half_power))
         if factor < 2.5:
             return 0.0
-        margin = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), 0.16)
-        return margin + (0.10 if self.speed > running else 0.0)
+        margin = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), MARGIN_BELOW)
+        return margin + (MARGIN_ABOVE - MARGIN_BELOW if self.speed > running else 0.0)
 
 
 @_solvable()

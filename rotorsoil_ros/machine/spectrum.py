@@ -7,11 +7,10 @@ import numpy as np
 import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
+from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.rational import Continuation
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.eigen import FreeVibration
-from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.reduced import ReducedRotor
 from rotorsoil_ros.rotor.whirl import held, ORBITS
 from rotorsoil_ros.units import rad_s_to_rpm
@@ -38,9 +37,6 @@ _MOST_SPARE = 64
 # Rotor modes that are solved for exactly, up to so many times the highest frequency: more of them
 # only where fewer leave the guesses too rough.
 _REACHES = (1.5, 5.0, 1e6)
-
-# Samples from which the compliance is continued.
-_SAMPLES = 120
 
 # The search ends at this many times the rotor's own frequencies.
 _HIGHEST = 30.0
@@ -123,12 +119,8 @@ class SpectrumSolver:
             if shapes >= slow + _MORE_SHAPES or shapes >= len(basis.shapes):
                 break
             shapes = slow + _MORE_SHAPES
-        low, high = _known(model.support, highest)
-        omega = np.unique(np.concatenate([
-            np.linspace(low, high, _SAMPLES // 2),
-            np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
-        compliance = Continuation.of(omega, model.support.motion_compliance)
-        return cls(model, basis, compliance, (low, high))
+        low, high = model.support.known(highest)
+        return cls(model, basis, model.support.continued((low, high)), (low, high))
 
     @classmethod
     def lowest(
@@ -154,7 +146,7 @@ class SpectrumSolver:
         while True:
             _, found = cls.up_to(model, highest, shapes=shapes).refined(speed, count, spare=spare)
             enough = np.isfinite(found.frequency).sum(axis=1).min() >= count
-            ended = not _answers(model.support, highest) or highest > _HIGHEST * first
+            ended = not model.support.answers(highest) or highest > _HIGHEST * first
             if enough or (ended and spare > _MOST_SPARE):
                 return found
             spare, highest = 4 * spare, highest if ended else 2.0 * highest
@@ -282,31 +274,6 @@ def _highest(basis: ReducedRotor, speed: FloatArray, count: int) -> float:
     # What has no mass has no mode, but some round-off instead.
     massive = int((both > _MASSLESS * both[:, :1]).sum(axis=1).min())
     return float((1.1 / both[:, min(count, massive) - 1]).max())
-
-
-def _answers(support: Support, omega: float) -> bool:
-    """Return whether every soil knows its compliance at a frequency [rad/s]."""
-    try:
-        return bool(np.all(np.isfinite(support.motion_compliance(np.array([omega])))))
-    except OutOfTableError:
-        return False
-
-
-def _known(support: Support, highest: float) -> tuple[float, float]:
-    """Return the part of 0 to `highest` for which every soil gives an answer."""
-    def edge(inside: float, outside: float) -> float:
-        if _answers(support, outside):
-            return outside
-        while abs(outside - inside) > 1e-4 * highest:
-            middle = 0.5 * (inside + outside)
-            known = _answers(support, middle)
-            inside, outside = (middle, outside) if known else (inside, middle)
-        return inside
-
-    within = highest
-    while not _answers(support, within) and within > 1e-6 * highest:
-        within *= 0.5
-    return edge(within, 0.0), edge(within, highest)
 
 
 def _widen(values: np.ndarray, width: int) -> np.ndarray:

@@ -9,10 +9,20 @@ import numpy as np
 import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.ground.rational import Continuation
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.foundation import BlockReceptance, carrying, Foundation
 from rotorsoil_ros.rotor.bearing import Bearing
+
+# Samples from which the compliance is continued.
+_SAMPLES = 120
+
+# Poles of the soil that weigh less are noise of its fit.
+_NOISE = 1e-4
+
+# What hardly swings, |Re w| below this share of |w|, has no natural frequency.
+_CREEPING = 0.2
 
 
 @dataclass(frozen=True)
@@ -133,6 +143,83 @@ class Support:
         axes = np.array(self.pedestal_axes, dtype=int)
         total[:, blocks:, blocks:] = self.pedestals(omega)[:, axes[:, None], axes]
         return total
+
+    def answers(self, omega: float) -> bool:
+        """Return whether every soil knows its compliance at a frequency [rad/s]."""
+        try:
+            return bool(np.all(np.isfinite(self.motion_compliance(np.array([omega])))))
+        except OutOfTableError:
+            return False
+
+    def known(self, highest: float) -> tuple[float, float]:
+        """Return the part of 0 to `highest` [rad/s] for which every soil gives an answer."""
+        def edge(inside: float, outside: float) -> float:
+            if self.answers(outside):
+                return outside
+            while abs(outside - inside) > 1e-4 * highest:
+                middle = 0.5 * (inside + outside)
+                known = self.answers(middle)
+                inside, outside = (middle, outside) if known else (inside, middle)
+            return inside
+
+        within = highest
+        while not self.answers(within) and within > 1e-6 * highest:
+            within *= 0.5
+        return edge(within, 0.0), edge(within, highest)
+
+    def continued(self, span: tuple[float, float]) -> Continuation:
+        """Return the compliance without any mass, continued from frequencies in a span."""
+        low, high = span
+        omega = np.unique(np.concatenate([
+            np.linspace(low, high, _SAMPLES // 2),
+            np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
+        return Continuation.of(omega, self.motion_compliance)
+
+    def natural_frequencies(
+        self, carried: FloatArray, highest: float,
+    ) -> tuple[FloatArray, ComplexArray]:
+        """
+        Return how the support vibrates under bodies that are rigid themselves.
+
+        Parameters
+        ----------
+        carried : (2 b, 2 b) float array
+            Mass over (x, z) of the housings [kg].
+        highest : float
+            Frequency up to which to look, as far as the soil is known [rad/s].
+
+        Returns
+        -------
+        frequency : (m,) float array
+            |lambda| of what vibrates, rising [rad/s].
+        motion : (m, 2 b) complex array
+            Of the housings.
+
+        """
+        if not len(self.motion_mass):
+            return np.zeros(0), np.zeros((0, len(carried)), dtype=complex)
+        span = self.known(highest)
+        compliance = self.continued(span)
+        size, unit, soil = compliance.size, 0.5 * span[1], compliance.states(_NOISE)
+        rows = self.motion_rows * size
+        mass = size[:, None] * self.motion_mass * size + rows.T @ carried @ rows
+        own, states = len(mass), len(soil.poles)
+        # z = constant p + left xi, w xi = poles xi + right p, p = w^2 M z with w z = unit u.
+        a = np.zeros((2 * own + states,) * 2, dtype=complex)
+        b = np.zeros_like(a)
+        motion, rate, state = slice(0, own), slice(own, 2 * own), slice(2 * own, None)
+        a[motion, motion], a[motion, state] = np.eye(own), -soil.left
+        b[motion, rate] = unit * soil.constant @ mass
+        a[rate, rate], b[rate, motion] = unit * np.eye(own), np.eye(own)
+        a[state, state] = np.diag(soil.poles)
+        b[state, rate], b[state, state] = -unit * soil.right @ mass, np.eye(states)
+        frequency, vectors = scipy.linalg.eig(a, b)
+        finite = np.isfinite(frequency)
+        frequency, vectors = frequency[finite], vectors[:, finite]
+        chosen = np.flatnonzero((frequency.real > _CREEPING * np.abs(frequency))
+                                & (np.abs(frequency) <= span[1]))
+        chosen = chosen[np.argsort(np.abs(frequency[chosen]))]
+        return np.abs(frequency[chosen]), (rows @ vectors[motion, chosen]).T
 
 
 @dataclass(frozen=True)

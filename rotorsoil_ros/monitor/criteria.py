@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import json
-import math
 import os
 from pathlib import Path
 import subprocess
@@ -15,7 +14,8 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.summary import unstable
+from rotorsoil_ros.case.summary import clipped, unstable
+from rotorsoil_ros.case.zone_limits import RIGID_MARGIN
 from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
@@ -25,12 +25,8 @@ from rotorsoil_ros.machine.response import Predictor, ResponseTable
 from rotorsoil_ros.monitor.points import Reference
 from rotorsoil_ros.monitor.quasistatic import Resonance
 
-# Natural frequencies are looked for between these multiples of the highest speed: what decides
-# on the class of a support lies up to a quarter above it.
+# Critical speeds are looked for between these multiples of the highest speed.
 _LOOKED_FOR = (0.02, 1.3)
-
-# A mode belongs to a direction if this share of the rotor's motion is in it.
-_IN_DIRECTION = 0.1
 
 
 @dataclass(frozen=True)
@@ -73,11 +69,13 @@ class Expectation:
         spread = spread or case.uncertainty
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
-        low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
         band = models.response_band(case, model, table, spread)
         notes = list(unstable(table.stability))
+        low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
+        span = model.within_tables((min(low, case.speed_range[0] or low), high))
+        notes += clipped(span, (low, high))
         try:
-            modes = critical_speeds(model, (min(low, case.speed_range[0] or low), high))
+            modes = critical_speeds(model, span)
         except NotSolvedError as error:
             modes = ()
             notes.append(f'critical speeds of the model are not known: {error}')
@@ -97,12 +95,8 @@ class Expectation:
 
     def lowest_natural_speed(self, axis: str) -> float:
         """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
-        column = 'xz'.index(axis)
-        for mode in self.modes:
-            power = np.sum(np.abs(mode.deflection) ** 2, axis=0)
-            if power[column] >= _IN_DIRECTION * power.sum():
-                return mode.speed
-        return math.inf
+        highest = RIGID_MARGIN * _LOOKED_FOR[1] * self.case.speed_range[1]
+        return self.model.lowest_natural_frequency(axis, highest)
 
     def vector(self, unbalances: Mapping[str, complex]) -> ComplexArray:
         """Return the unbalance of every plane [kg m]; a plane that is not named has none."""

@@ -88,9 +88,13 @@ def _worst(
                          for speed in channel.speed.tolist()])
     for support, of_class in (('rigid', ~flexible), ('flexible', flexible)):
         if (mine := chosen & of_class).any():
-            at = int(np.where(mine, velocity, -1.0).argmax())
             kind: SupportClass = 'rigid' if support == 'rigid' else 'flexible'
-            bounds, value = limits.of(kind), float(velocity[at])
+            # The worst is what comes closest to its limit: that of displacement falls with speed.
+            highest = np.array([limits.of(kind, abs(speed))[2]
+                                for speed in channel.speed.tolist()])
+            share = velocity / np.where(highest > 0.0, highest, 1.0)
+            at = int(np.where(mine, share, -1.0).argmax())
+            bounds, value = limits.of(kind, abs(float(channel.speed[at]))), float(velocity[at])
             candidates.append(HousingZone(
                 channel.channel, source, float(channel.speed[at]), value, zone(value, bounds),
                 kind, bounds, bool(steady[at])))
@@ -190,7 +194,7 @@ class Vibration:
         # Other limits make another question: nothing is held over from the last one.
         before = state.zone if support == state.support else None
         state.support = support
-        state.zone = held_zone(before, velocity, self._rules.zones.of(support),
+        state.zone = held_zone(before, velocity, self._rules.zones.of(support, abs(speed)),
                                hysteresis=HYSTERESIS)
 
 

@@ -114,7 +114,8 @@ class TrendLines:
         rows = self._recording.begins(f'{self._machine} limits', stamp_ns, LIMITS_NS)
         for axis, lowest in zip('xz', natural if len(rows) else (), strict=False):
             bounds = 1e3 * np.array(
-                [zones.of(support_class(lowest, each)) for each in speed[rows].tolist()])
+                [zones.of(support_class(lowest, each), abs(each))
+                 for each in speed[rows].tolist()])
             for number, (name, colour) in enumerate(LIMITS.items()):
                 entity = rr.new_entity_path(
                     [self._machine, 'limits', axis, name.replace('/', '_')])

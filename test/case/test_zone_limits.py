@@ -1,5 +1,6 @@
 """Zones against the printed limits."""
 
+import dataclasses
 import math
 
 import pytest
@@ -44,3 +45,26 @@ def test_velocity_that_is_none_has_no_zone(velocity):
 def test_limits_must_rise():
     with pytest.raises(RotorSoilError, match='rigid must be three rising velocities'):
         ZoneLimits('mine', (2e-3, 1e-3, 3e-3), (1e-3, 2e-3, 3e-3))
+
+
+@pytest.mark.parametrize('group, hertz', [(1, 12.5), (2, 10.0)])
+def test_displacement_is_the_stricter_limit_of_slow_machines(group, hertz):
+    limits = ISO_10816_3[group]
+    for support in ('rigid', 'flexible'):
+        velocities, displacements = limits.of(support), getattr(limits, f'{support}_displacement')
+        # Both criteria of a row meet at one frequency, as the published charts have it.
+        for velocity, displacement in zip(velocities, displacements, strict=True):
+            assert velocity / displacement / (2.0 * math.pi) == pytest.approx(hertz, rel=0.03)
+        assert limits.of(support, 2.0 * math.pi * 0.5 * hertz) == tuple(
+            math.pi * hertz * displacement for displacement in displacements)
+        assert limits.of(support, 2.0 * math.pi * 2.0 * hertz) == velocities
+
+
+def test_alarm_is_a_quarter_above_the_baseline_and_trip_above_the_last_boundary():
+    limits = dataclasses.replace(ISO_10816_3[2], baseline=1.0e-3)
+    assert limits.alarm('rigid') == pytest.approx(1.0e-3 + 0.25 * 2.8e-3)
+    assert limits.trip('rigid') == pytest.approx(1.25 * 4.5e-3)
+    assert dataclasses.replace(limits, baseline=9e-3).alarm('rigid') == 1.25 * 2.8e-3
+    assert ISO_10816_3[2].alarm('rigid') == 2.8e-3
+    with pytest.raises(RotorSoilError, match='baseline must be > 0 m/s'):
+        dataclasses.replace(limits, baseline=0.0)

@@ -14,6 +14,7 @@ from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine import eigen, modes, spectrum
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.margins import half_power_factors
 from rotorsoil_ros.machine.modes import campbell, critical_speeds
 from rotorsoil_ros.machine.spectrum import SpectrumSolver
 from rotorsoil_ros.rotor.assembly import Rotor
@@ -603,6 +604,38 @@ def test_amplification_factor_is_that_of_the_half_power_points():
     assert factor == pytest.approx(critical.amplification_factor, rel=5e-3)  # 2001 points
 
 
+def test_half_power_factor_is_that_of_the_response_to_unbalance():
+    # A massless shaft: the mode does not change with speed, so that the peak of m e omega^2 has
+    # the closed form of one degree of freedom with damping ratio zeta.
+    light = ShaftSection(1.2, (0.05, 0.05), (0.0, 0.0), 2, Material(2.1e11, 0.3, 0.0))
+    rotor = Rotor(0.0, (light,), (Disc('disc', 0.6, 40.0, 0.0, 0.0),), tuple(
+        bearing(name, place, stiffness=2e7, damping=1e5, foundation=None)
+        for name, place in (('a', 0.0), ('b', 1.2))))
+    model = CoupledModel(rotor)
+    forward = next(one for one in critical_speeds(model, (50.0, 1000.0)) if one.whirl > 0)
+    zeta, ratio = forward.damping_ratio, np.linspace(0.5, 2.0, 2_000_001)
+    size = ratio**2 / np.hypot(1.0 - ratio**2, 2.0 * zeta * ratio)
+    wide = ratio[size > size.max() / math.sqrt(2.0)]
+    (found,) = half_power_factors(model, [forward])
+    assert found == pytest.approx(ratio[size.argmax()] / np.ptp(wide), rel=1e-2)  # damper behind the shaft
+
+
+def test_a_peak_belongs_to_the_nearest_mode_and_a_damped_mode_may_have_none():
+    model = paper_machine()
+    criticals = critical_speeds(model, (150.0, 320.0))
+    factors = half_power_factors(model, criticals)
+    for critical, factor in zip(criticals, factors, strict=True):
+        assert math.isfinite(factor) or critical.amplification_factor < 1.0 or critical.whirl < 0
+    assert sum(map(math.isfinite, factors)) >= 1
+
+
+def test_required_margin_goes_by_the_sharper_of_both_factors():
+    critical = critical_speeds(paper_machine(), (280.0, 320.0))[0]
+    damped = type(critical)(300.0, 1, 0.5 / 2.4, critical.deflection, critical.support)
+    assert damped.required_margin(400.0, half_power=11.5) == pytest.approx(0.17 * 0.9)
+    assert damped.required_margin(400.0, half_power=math.nan) == 0.0
+
+
 def test_margins_are_those_of_the_standard():
     critical = critical_speeds(paper_machine(), (280.0, 320.0))[0]
     assert critical.separation_margin(critical.speed / 1.25) == pytest.approx(0.25)
@@ -638,3 +671,21 @@ def test_damper_alone_holds_no_shaft_but_damps_it():
     model = CoupledModel(rotor)
     found = campbell(model, np.array([200.0]), 6)
     np.testing.assert_allclose(found.eigenvalue[0], all_of(model, 200.0)[:6], rtol=1e-8)
+
+
+def test_support_with_a_rigid_rotor_has_the_frequencies_of_its_mass_on_its_springs():
+    # Symmetric: rotor and block heave as one mass; a soft shaft and soft bearings change nothing.
+    soil = Springs(np.diag([2e8, 2e8, 3e8, 9e9, 9e9, 9e9]), 1e3 * np.eye(6))
+    rotor = uniform_rotor(
+        length=1.2, diameter=0.01, elements=4, material=STEEL, height=0.0,
+        discs=[Disc('wheel', 0.6, 300.0, 1.0, 2.0)],
+        bearings=[bearing(name, place, stiffness=1e5) for name, place in (('a', 0.1), ('b', 1.1))])
+    block = Foundation('block', CONTACT, 0.6, 900.0, 0.0, (50.0, 50.0, 50.0))
+    model = CoupledModel(rotor, (block,), (soil,))
+    heave = math.sqrt(3e8 / (900.0 + rotor.mass))
+    sliding = math.sqrt(2e8 / (900.0 + rotor.mass))
+    assert model.lowest_natural_frequency('z', 1000.0) == pytest.approx(heave, rel=1e-9)
+    assert model.lowest_natural_frequency('x', 1000.0) == pytest.approx(sliding, rel=1e-9)
+    assert model.lowest_natural_frequency('z', 0.9 * heave) == math.inf
+    firm = CoupledModel(rotor, (block,), (RigidSoil(),))
+    assert firm.lowest_natural_frequency('z', 1000.0) == math.inf
