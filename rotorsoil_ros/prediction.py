@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, to_lag_deg, to_mm_s_rms, to_um_pp
@@ -115,6 +115,14 @@ class Response:
         """Return what a model answered to its unbalance, labelled."""
         return cls(channels, prediction.speed, prediction.speed, prediction.displacement,
                    prediction.force, stamp_ns)
+
+    def where(self, exists: BoolArray) -> 'Response':
+        """Return the same with NaN where no steady response exists, (n,)."""
+        if exists.all():
+            return self
+        rows, none = exists[:, None], complex(np.nan, np.nan)
+        return replace(self, displacement=np.where(rows, self.displacement, none),
+                       force=np.where(rows, self.force, none))
 
     def __len__(self) -> int:
         """Return the number of speeds or frequencies."""

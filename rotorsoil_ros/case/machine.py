@@ -19,6 +19,7 @@ from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes import Campbell, campbell, critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.stability import Stability, stability
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
@@ -85,7 +86,8 @@ class Machine:
         Returns
         -------
         Response
-            Over n speeds and all channels [m, rad, N, N m].
+            Over n speeds and all channels [m, rad, N, N m]; NaN where the machine is unstable,
+            as `stability` tells.
 
         Raises
         ------
@@ -96,8 +98,9 @@ class Machine:
 
         """
         speed = rpm_to_rad_s(_numbers('rpm', rpm))
-        return Response.of(self.model.channels,
-                           self.model.unbalance_response(speed, self.case.unbalance))
+        found = Response.of(self.model.channels,
+                            self.model.unbalance_response(speed, self.case.unbalance))
+        return found.where(self._growth(speed).holds(speed))
 
     def frf(self, *, force: str, hz: Numbers, rpm: float = 0.0) -> Response:
         """
@@ -126,8 +129,9 @@ class Machine:
 
         """
         columns_of(self.model.channels, force)
-        omega, [speed] = hz_to_rad_s(_numbers('hz', hz)), rpm_to_rad_s(_numbers('rpm', rpm))
-        return self.model.frequency_response(omega, speed=float(speed), channel=force)
+        omega, speed = hz_to_rad_s(_numbers('hz', hz)), rpm_to_rad_s(_numbers('rpm', rpm))
+        found = self.model.frequency_response(omega, speed=float(speed[0]), channel=force)
+        return found.where(np.repeat(self._growth(speed).holds(speed[:1]), len(omega)))
 
     def order_response(self, *, order: float, force: str, rpm: Numbers) -> Response:
         """
@@ -145,7 +149,37 @@ class Machine:
         """
         columns_of(self.model.channels, force)
         speed = rpm_to_rad_s(_numbers('rpm', rpm))
-        return self.model.harmonic_response(speed, order=order, channel=force)
+        found = self.model.harmonic_response(speed, order=order, channel=force)
+        return found.where(self._growth(speed).holds(speed))
+
+    def stability(self, *, rpm_range: tuple[float, float] | None = None) -> Stability:
+        """
+        Find every mode that grows on its own, and what feeds it.
+
+        Parameters
+        ----------
+        rpm_range : tuple of two floats or None
+            Between which speeds [rpm], as far as tables of bearings go; None from rest to the
+            end of the speed range of the case.
+
+        Raises
+        ------
+        InputError
+            If what is known of the support does not determine the modes.
+
+        """
+        low, high = ((0.0, self.case.speed_range[1]) if rpm_range is None
+                     else rpm_to_rad_s(_numbers('rpm_range', rpm_range)).tolist())
+        try:
+            return stability(self.model, (low, high))
+        except NotSolvedError as error:
+            raise self._undecided(error) from error
+
+    def _growth(self, speed: FloatArray) -> Stability:
+        """Return where a mode grows among speeds (n,) [rad/s]."""
+        if not len(speed):
+            return Stability((0.0, 0.0), (), 0.0)
+        return stability(self.model, (float(speed.min()), float(speed.max())))
 
     def campbell(self, *, rpm: Numbers, modes: int = MODES) -> Campbell:
         """

@@ -8,8 +8,8 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.mode_names import ModeNames
 from rotorsoil_ros.machine.modes import critical_speeds
-from rotorsoil_ros.rotor.assembly import Disc
 from rotorsoil_ros.rotor.bearing import Pedestal
+from rotorsoil_ros.rotor.disc import Disc
 
 from machines import bearing, CONTACT, Springs, STEEL, uniform_rotor
 
@@ -24,7 +24,8 @@ def machine(soil, *, shaft=0.3, spring=STIFF, pedestal=None, inertia=1.0):
         bearings = [type(one)(one.name, one.position, one.foundation, one.stiffness, one.damping,
                               pedestal) for one in bearings]
     rotor = uniform_rotor(length=1.2, diameter=shaft, elements=12, material=STEEL, height=0.9,
-                          discs=[Disc('wheel', 0.6, 50.0, inertia, 2.0 * inertia)], bearings=bearings)
+                          bearings=bearings,
+                          discs=[Disc('wheel', 0.6, 50.0, inertia, 2.0 * inertia)])
     block = Foundation('base', CONTACT, 0.6, 9000.0, 0.4, (800.0, 900.0, 1500.0))
     return CoupledModel(rotor, (block,), (soil,))
 

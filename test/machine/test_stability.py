@@ -14,8 +14,10 @@ from rotorsoil_ros.machine.feeding import highest_fed
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.pencil import Pencil
 from rotorsoil_ros.machine.stability import Stability, stability
-from rotorsoil_ros.rotor.assembly import Bearing, Disc, Material, Rotor, ShaftSection
-from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
+from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.shaft import Material, ShaftSection
 
 from machines import elastic_machine, paper_machine, Springs, STEEL
 from oracles.dense import _System, dense_eigenvalues
