@@ -17,7 +17,7 @@ INSTALLED := .venv/.installed
 FITS := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 demo: $(INSTALLED)
-	$(BIN)/rotorsoil demo -o demo_output
+	$(BIN)/rotorsoil demo -o demo_output --force
 
 test: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -199,7 +199,12 @@ def test_bad_input_is_one_line_and_status_2(arguments, problem, capfd):
 
 @pytest.mark.parametrize('arguments, problem', [
     ([], 'rotorsoil: the following arguments are required: VERB'),
-    (['nothing'], "rotorsoil: argument VERB: invalid choice: 'nothing'"),
+    (['nothing'], "rotorsoil: argument VERB: 'nothing' is not known; it must be one of check,"),
+    (['chek', PAPER], "rotorsoil: argument VERB: 'chek' is not known; did you mean check?"),
+    (['response', PAPER, '--rpm', '1:2:3', '--outptu', 'x'],
+     'rotorsoil: unrecognized arguments: --outptu x; did you mean --output?'),
+    (['response', PAPER, '--rpm', '1:2:3', '--units', 'plan'],
+     "rotorsoil response: argument --units: 'plan' is not known; did you mean plant?"),
     (['response', PAPER], 'rotorsoil response: one of the arguments --rpm --hz is required'),
     (['response', PAPER, '--rpm', '1:2'],
      "rotorsoil response: argument --rpm: must be start:stop:count, ends included, got '1:2'"),
@@ -271,3 +276,72 @@ def test_reader_that_has_seen_enough_hears_no_complaint():
         process.stdout.close()
         assert process.stderr.read() == b''
     assert process.returncode == 0
+
+
+@pytest.mark.parametrize('verb', [
+    ['response', PAPER, '--rpm', '60:900:3', '-o'], ['plot', PAPER, '-o'],
+    ['figures', '-o'], ['compliance', PAPER, '--hz', '1:2:2', '-o'],
+    ['frf', PAPER, '--rpm', '0', '--hz', '1:2:2', '--force', 'disc_1_x', '-o'],
+    ['campbell', PAPER, '--rpm', '60:900:3', '-o']])
+def test_nothing_that_exists_is_overwritten(verb, tmp_path, capsys):
+    kept = tmp_path / 'mine.csv'
+    kept.write_text('mine')
+    out = tmp_path if verb[0] in ('plot', 'figures') else kept
+    assert main([*verb, str(out)]) == 2
+    assert capsys.readouterr().err == f'{out}: exists; --force replaces it\n'
+    assert kept.read_text() == 'mine'
+    assert [path.name for path in tmp_path.iterdir() if path.name != 'cache'] == ['mine.csv']
+
+
+def test_force_replaces_what_exists_and_still_says_where_a_force_acts(tmp_path, capsys):
+    out = tmp_path / 'frf.csv'
+    frf = ['frf', PAPER, '--rpm', '0', '--hz', '1:2:2', '--force', 'disc_1_x', '-o', str(out)]
+    assert main(frf) == 0
+    first = out.read_text()
+    out.write_text('old')
+    assert main([*frf, '--force']) == 0
+    assert out.read_text() == first
+
+
+def test_plant_units_are_those_of_the_same_response(capsys):
+    sweep = ['response', PAPER, '--rpm', '600:9000:3', '--units']
+    assert main([*sweep, 'si']) == 0
+    si, rows = table_of(capsys.readouterr().out)
+    assert main([*sweep, 'plant']) == 0
+    plant, values = table_of(capsys.readouterr().out)
+    vector = complex_column(si, rows, 'disc_1_x')
+    speed = rows[:, 0]
+
+    def column(name):
+        return values[:, plant.index(name)]
+
+    np.testing.assert_allclose(column('speed_rpm'), [600.0, 4800.0, 9000.0])
+    np.testing.assert_allclose(column('disc_1_x_um_pp'), 2e6 * np.abs(vector))
+    np.testing.assert_allclose(column('disc_1_x_mm_s_rms'),
+                               1e3 * speed * np.abs(vector) / math.sqrt(2.0))
+    lag = np.exp(-1j * np.radians(column('disc_1_x_lag_deg')))
+    np.testing.assert_allclose(lag * np.abs(vector), vector, atol=1e-12 * np.abs(vector).max())
+    assert 'block_ry_urad_pp' in plant
+
+
+@pytest.mark.parametrize('words, wanted', [
+    ('rotorsoil ch', 'check'), ('rotorsoil response case.yaml --un', '--units'),
+    ('rotorsoil response case.yaml --units pl', 'plant'), ('rotorsoil completion z', 'zsh')])
+def test_bash_completes_verbs_options_and_choices(words, wanted, capsys, tmp_path):
+    assert main(['completion', 'bash']) == 0
+    script = tmp_path / 'completion.bash'
+    script.write_text(capsys.readouterr().out + f"""
+COMP_WORDS=({words})
+COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 ))
+_rotorsoil
+echo "${{COMPREPLY[@]}}"
+""")
+    done = subprocess.run(['bash', str(script)], capture_output=True, text=True)
+    assert done.stdout.split() == [wanted], done.stderr
+
+
+def test_quiet_leaves_out_warnings_only(capsys):
+    assert main(['campbell', PAPER, '--rpm', '60:900:2', '-q']) == 0
+    quiet = capsys.readouterr().out
+    assert main(['campbell', PAPER, '--rpm', '60:900:2', '-v']) == 0
+    assert capsys.readouterr().out == quiet

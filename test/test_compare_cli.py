@@ -295,7 +295,7 @@ def test_rotor_kit_bearing_stiffness_is_identified(kit_log, tmp_path, capsys):
     assert float(re.search(r'stiffness: factor (\S+)', said)[1]) == pytest.approx(0.077, rel=0.02)
     assert 90.0 < float(re.search(r'explains (\S+) %', said)[1]) < 95.3  # two modes: 0.953
     case = tmp_path / 'identified.yaml'
-    main([*arguments, '--with-transients', '--write-case', str(case)])
+    main([*arguments, '--with-transients', '--write-case', str(case), '--force'])
     capsys.readouterr()
     again = judged(kit_log, case)
     # Where and how high is explained; but a passage this fast proves nothing.

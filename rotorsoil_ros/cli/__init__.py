@@ -1,13 +1,15 @@
 """The verbs of `rotorsoil`: what each needs is imported only when it is called."""
 
+from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
 import logging
 import os
+from pathlib import Path
 import sys
 import warnings
 
-from rotorsoil_ros.cli.parser import parser
+from rotorsoil_ros.cli.parser import parse
 from rotorsoil_ros.errors import InputError, RotorSoilError
 
 BAD_INPUT = 2
@@ -29,10 +31,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit status: 0 done, 1 a verdict that fails, 2 bad input.
 
     """
-    logging.basicConfig(format='%(message)s', level=logging.WARNING)
-    arguments = parser().parse_args(argv)
+    arguments = parse(argv)
+    logging.basicConfig(format='%(message)s')
+    logging.getLogger().setLevel(logging.ERROR if arguments.quiet else
+                                 logging.INFO if arguments.verbose else logging.WARNING)
     module, function = arguments.run.split(':')
     try:
+        _refuse_existing(arguments)
         with warnings.catch_warnings():
             # An overflow ends in an error of one line; numpy's remarks would bury it.
             warnings.simplefilter('ignore', RuntimeWarning)
@@ -57,6 +62,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     return status
+
+
+def _refuse_existing(arguments: Namespace) -> None:
+    """Refuse to write over what somebody may want to keep, before anything is computed."""
+    for name in () if arguments.replace else arguments.outputs:
+        given = getattr(arguments, name)
+        if given in (None, '-'):
+            continue
+        path = Path(given)
+        holds = arguments.makes_directory and path.is_dir() and any(path.iterdir())
+        if path.is_file() or holds:
+            raise InputError(f'{path}: exists; --force replaces it')
 
 
 def _forget_output() -> None:

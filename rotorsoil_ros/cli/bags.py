@@ -1,11 +1,13 @@
 """Recorded profiles, answered offline or sent into the graph."""
 
 from argparse import Namespace
+import os
+from pathlib import Path
 import sys
 
 from rotorsoil_ros.case import config, document, ross, writer
 from rotorsoil_ros.cli.progress import progress
-from rotorsoil_ros.cli.sweeps import opened
+from rotorsoil_ros.cli.table import opened
 
 
 def predict(arguments: Namespace) -> int:
@@ -38,8 +40,16 @@ def recover(arguments: Namespace) -> int:
     """Save everything readable of a log whose writer was killed."""
     from rotorsoil_ros.bags.recover import recover as save
 
-    with progress('recovering') as report:
-        saved = save(arguments.broken, arguments.output, progress=report)
+    # What is replaced stays until the new one is complete.
+    out: Path = arguments.output
+    aside = out.with_name(f'.{out.name}.{os.getpid()}') if out.exists() else out
+    try:
+        with progress('recovering') as report:
+            saved = save(arguments.broken, aside, progress=report)
+        aside.replace(out)
+    finally:
+        if aside != out:
+            aside.unlink(missing_ok=True)
     print(f'{arguments.output}: {saved}')
     return 0
 

@@ -1,22 +1,56 @@
 """What may stand behind `rotorsoil`."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 import math
 from pathlib import Path
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import rotorsoil_ros
 
+PLANT, SI = 'plant', 'si'
 _LONGEST_SWEEP = 10_000_000
 
 
 class _OneLineParser(argparse.ArgumentParser):
-    """Parser that says what is wrong in one line."""
+    """Parser that says what is wrong in one line, and what was probably meant."""
 
     def error(self, message: str) -> NoReturn:
         """Leave with one line on standard error and status 2."""
         self.exit(2, f'{self.prog}: {message} (see {self.prog} --help)\n')
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            near = get_close_matches(str(value), known, n=1)
+            advice = (f'did you mean {near[0]}?' if near else
+                      f'it must be one of {", ".join(known)}')
+            raise argparse.ArgumentError(action, f'{value!r} is not known; {advice}')
+
+
+class _Force(argparse.Action):
+    """`--force` replaces an output; where a force may act, `--force CHANNEL` says where."""
+
+    def __call__(self, parser: object, namespace: argparse.Namespace, values: Any,
+                 option_string: str | None = None) -> None:
+        """Take the option in, with a channel or without."""
+        if values:
+            namespace.acting_at = values
+        else:
+            namespace.replace = True
+
+
+def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Return what a command line asks for, or leave with one line that says what is wrong."""
+    top = parser()
+    arguments, unknown = top.parse_known_args(argv)
+    if unknown:
+        near = get_close_matches(unknown[0].partition('=')[0], arguments.options, n=1)
+        advice = f'; did you mean {near[0]}?' if near else ''
+        top.error(f'unrecognized arguments: {" ".join(unknown)}{advice}')
+    return arguments
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +124,11 @@ def parser() -> argparse.ArgumentParser:
     _add_case_verbs(verbs)
     _add_import_verbs(verbs)
     _add_live_verbs(verbs)
+    completion = _verb(verbs, 'completion', 'completion:completion',
+                       'print what lets a shell complete verbs and options', case=False)
+    completion.add_argument('shell', choices=('bash', 'zsh', 'fish'))
+    for verb in verbs.choices.values():
+        verb.set_defaults(options=list(verb._option_string_actions))
     return top
 
 
@@ -101,7 +140,11 @@ def _verb(
 ) -> argparse.ArgumentParser:
     """Add one verb; those that take a case share its options."""
     verb = verbs.add_parser(name, help=says, description=f'{says[0].upper()}{says[1:]}.')
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run, replace=False, outputs=())
+    how_loud = verb.add_mutually_exclusive_group()
+    how_loud.add_argument('-q', '--quiet', action='store_true',
+                          help='neither warnings nor progress, only results and errors')
+    how_loud.add_argument('-v', '--verbose', action='store_true', help='say what is being done')
     if case:
         verb.add_argument('case', metavar='CASE', type=Path, help='case file (YAML)')
         verb.add_argument('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append',
@@ -113,9 +156,37 @@ def _verb(
     return verb
 
 
-def _add_output(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument('-o', '--output', metavar='FILE', default='-',
-                      help='CSV file to write; - is standard output (default)')
+def _add_output(
+    verb: argparse.ArgumentParser, metavar: str, says: str, *, default: str | None = None,
+    acts: bool = False,
+) -> None:
+    """Add an output that is refused if it exists, and what replaces it."""
+    if default == '-':
+        verb.add_argument('-o', '--output', metavar=metavar, default='-',
+                          help=f'{says}; - is standard output (default)')
+    else:
+        verb.add_argument('-o', '--output', metavar=metavar, type=Path,
+                          default=default and Path(default), required=default is None,
+                          help=says + (f' (default: {default})' if default else ''))
+    verb.set_defaults(outputs=('output',), makes_directory=metavar == 'DIR', acting_at=None)
+    if acts:
+        verb.add_argument('--force', metavar='CHANNEL', nargs='?', action=_Force,
+                          help='where a force acts, as in disc_1_z (a block that turns, as in '
+                               'block_ry: 1 N m); without CHANNEL: replace what exists')
+    else:
+        verb.add_argument('--force', nargs=0, action=_Force, help='replace what exists')
+
+
+def _add_table_output(verb: argparse.ArgumentParser, *, acts: bool = False) -> None:
+    """Add the output and the units of a table."""
+    _add_output(verb, 'FILE', 'CSV file to write', default='-', acts=acts)
+    _add_units(verb)
+
+
+def _add_units(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument('--units', choices=(PLANT, SI),
+                      help='plant: um peak-to-peak, mm/s rms, rpm, Hz, degrees of lag (default on '
+                           'a terminal); si: m, rad, rad/s (default in files)')
 
 
 def _add_case_verbs(verbs: _Verbs) -> None:
@@ -129,7 +200,7 @@ def _add_case_verbs(verbs: _Verbs) -> None:
                        help='dimensionless frequency, omega b / c_s or omega r0 / c_s')
     sweep.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, help='frequency [Hz]')
     compliance.add_argument('--foundation', metavar='NAME', help='which block, if several')
-    _add_output(compliance)
+    _add_table_output(compliance)
     response = _verb(verbs, 'response', 'sweeps:response',
                      'write the unbalance response of every channel as CSV')
     sweep = response.add_mutually_exclusive_group(required=True)
@@ -137,19 +208,14 @@ def _add_case_verbs(verbs: _Verbs) -> None:
     sweep.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, help='rotor speed [turns/s]')
     response.add_argument('--order', metavar='N', type=_order,
                           help='a force of 1 N at N times the speed instead of the unbalance; '
-                               'needs --force')
-    response.add_argument('--force', metavar='CHANNEL',
-                          help='where that force acts, as in disc_1_z (a block that turns, as in '
-                               'block_ry: 1 N m)')
-    _add_output(response)
+                               'needs --force CHANNEL')
+    _add_table_output(response, acts=True)
     _add_modal_verbs(verbs)
     plot = _verb(verbs, 'plot', 'pictures:plot', 'draw every picture of a case')
-    plot.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
-                      help='directory for the PNG files')
+    _add_output(plot, 'DIR', 'directory for the PNG files')
     figures = _verb(verbs, 'figures', 'pictures:figures',
                     "compute the seed paper's figures 6, 8 and 9", case=False)
-    figures.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
-                         help='directory for PNG and CSV files')
+    _add_output(figures, 'DIR', 'directory for PNG and CSV files')
     figures.add_argument('--cache', metavar='DIR', type=Path, help='directory of computed tables')
 
 
@@ -160,31 +226,27 @@ def _add_modal_verbs(verbs: _Verbs) -> None:
                      help='rotor speed [rpm]; 0 is an impact test at rest')
     frf.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, required=True,
                      help='frequency of the force [Hz]')
-    frf.add_argument('--force', metavar='CHANNEL', required=True,
-                     help='where the force acts, as in disc_1_z (a block that turns, as in '
-                          'block_ry: 1 N m)')
-    _add_output(frf)
+    _add_table_output(frf, acts=True)
     campbell = _verb(verbs, 'campbell', 'modal:campbell',
                      'write natural frequencies, damping and whirl over the speed as CSV')
     campbell.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse,
                           help='rotor speed [rpm] (with --criticals: A to B; default: the speed '
                                'range of the case)')
-    campbell.add_argument('--modes', metavar='K', type=_modes, default=8,
-                          help='how many modes at each speed, the lowest (default: %(default)s)')
+    campbell.add_argument('--modes', metavar='K', type=_modes,
+                          help='how many modes at each speed, the lowest (default: eight)')
     campbell.add_argument('--criticals', action='store_true',
                           help='write the critical speeds instead')
     campbell.add_argument('--running', metavar='R', type=_rpm,
                           help='with --criticals: running speed [rpm], from which separation '
                                'margins (API 617) are written too')
-    _add_output(campbell)
+    _add_table_output(campbell)
 
 
 def _add_import_verbs(verbs: _Verbs) -> None:
     ross = _verb(verbs, 'import-ross', 'bags:import_ross',
                  'write the case of a rotor that ROSS saved as TOML', case=False)
     ross.add_argument('rotor', metavar='ROTOR.toml', type=Path, help='what Rotor.save wrote')
-    ross.add_argument('-o', '--output', metavar='CASE.yaml', default='-',
-                      help='case file to write; - is standard output (default)')
+    _add_output(ross, 'CASE.yaml', 'case file to write', default='-')
     ross.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse,
                       help='speed range of the case, A to B (default: what the tables of the '
                            'bearings cover)')
@@ -194,10 +256,10 @@ def _add_live_verbs(verbs: _Verbs) -> None:
     predict = _verb(verbs, 'predict', 'bags:predict',
                     'answer every speed of a recorded profile, without a ROS graph')
     predict.add_argument('profile', metavar='PROFILE', type=Path, help='MCAP file or bag')
-    predict.add_argument('-o', '--output', metavar='OUT.mcap', type=Path, required=True,
-                         help='log to write')
+    _add_output(predict, 'OUT.mcap', 'log to write')
     predict.add_argument('--rrd', metavar='OUT.rrd', type=Path,
                          help='recording for the rerun viewer')
+    predict.set_defaults(outputs=('output', 'rrd'))
     replay = _verb(verbs, 'replay', 'bags:replay',
                    'publish a recorded profile into the ROS graph', case=False)
     replay.add_argument('profile', metavar='PROFILE', type=Path, help='MCAP file or bag')
@@ -206,13 +268,11 @@ def _add_live_verbs(verbs: _Verbs) -> None:
     recover = _verb(verbs, 'recover', 'bags:recover',
                     'save everything readable of a log whose writer was killed', case=False)
     recover.add_argument('broken', metavar='BROKEN.mcap', type=Path, help='MCAP file')
-    recover.add_argument('-o', '--output', metavar='FIXED.mcap', type=Path, required=True,
-                         help='file to write; it must not exist')
+    _add_output(recover, 'FIXED.mcap', 'file to write')
     _add_compare(verbs)
     demo = _verb(verbs, 'demo', 'demo:demo',
                  'run up, dwell and coast down a machine before a live node', case=False)
-    demo.add_argument('-o', '--output', metavar='DIR', type=Path, default=Path('demo_output'),
-                      help='directory for log, recording and plots (default: demo_output)')
+    _add_output(demo, 'DIR', 'directory for log, recording and plots', default='demo_output')
 
 
 def _add_compare(verbs: _Verbs) -> None:
@@ -223,8 +283,9 @@ def _add_compare(verbs: _Verbs) -> None:
     add('case', metavar='CASE', type=Path, nargs='?',
         help='case file (YAML); needed for band, critical speeds and zones, unless the log was '
              'answered with a case of this package')
-    add('-o', '--output', metavar='DIR', type=Path, default=Path('comparison'),
-        help='directory for tables, pictures and report (default: comparison)')
+    _add_output(compare, 'DIR', 'directory for tables, pictures and report',
+                default='comparison')
+    compare.set_defaults(outputs=('output', 'write_case'))
     add('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append', default=[],
         help='override the case file; may be repeated')
     add('--cache', metavar='DIR', type=Path, help='directory of computed tables')

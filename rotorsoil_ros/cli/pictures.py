@@ -14,6 +14,8 @@ from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.cli.sweeps import machine_of
+from rotorsoil_ros.cli.table import write_table
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
@@ -24,15 +26,14 @@ from rotorsoil_ros.machine.response import ResponseTable
 
 def plot(arguments: Namespace) -> int:
     """Write one PNG for each picture and print its name."""
-    case = load(arguments.case, arguments.overrides)
+    machine = machine_of(arguments)
+    case, model = machine.case, machine.model
     arguments.output.mkdir(parents=True, exist_ok=True)
     with progress('drawing') as _:
-        directory = cache.directory(arguments.cache)
-        model = models.coupled_model(case, directory)
-        table = models.response_table(case, model, directory)
         for name, figure in chain(
-                all_figures(case, model, table), _modal_figures(case, model),
-                _studies(case, model, table), _soil_figures(case, model, directory)):
+                all_figures(case, model, machine.table), _modal_figures(case, model),
+                _studies(case, model, machine.table),
+                _soil_figures(case, model, machine.directory)):
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)
             print(path)
@@ -92,8 +93,7 @@ def figures(arguments: Namespace) -> int:
             print(out / f'{figure.name}.png')
             if figure.name != 'figure_6':
                 numbers += peak_numbers(figure)
-    lines = ['name,value,unit', *(f'{name},{value!r},{unit}' for name, value, unit in numbers)]
-    (out / 'numbers.csv').write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    write_table(str(out / 'numbers.csv'), ['name', 'value', 'unit'], numbers)
     print(out / 'numbers.csv')
     return 0
 
@@ -108,7 +108,4 @@ def _write_columns(figure: PaperFigure, path: Path) -> None:
         else:
             header.append(name)
             columns.append(values.real)
-    rows = np.stack(columns, axis=1).tolist()
-    with path.open('w', encoding='utf-8') as stream:
-        stream.write(','.join(header) + '\n')
-        stream.writelines(','.join(map(repr, row)) + '\n' for row in rows)
+    write_table(str(path), header, np.stack(columns, axis=1).tolist())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import logging
 import sys
 
 
@@ -21,7 +22,7 @@ def progress(says: str) -> Iterator[Callable[[int, int], None]]:
         To be called with what is done and the total.
 
     """
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() or logging.getLogger().level > logging.WARNING:
         yield lambda done, total: None
         return
     from rich.console import Console
