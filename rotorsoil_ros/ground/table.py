@@ -1,13 +1,16 @@
 """What a contact gives way by when somebody else computed or measured it."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 # Printed tables carry four digits; anything worse is a slip of a row or a sign.
 RECIPROCITY = 1e-3
@@ -35,9 +38,11 @@ class ComplianceTable:
 
     omega: FloatArray
     values: ComplexArray
-    _spline: CubicSpline = field(init=False, repr=False, compare=False)
+    _spline: 'CubicSpline' = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        from scipy.interpolate import CubicSpline  # as slow to import as half of a start
+
         _require_frequencies(self.omega)
         _require_compliances(self.values, self.omega)
         object.__setattr__(self, '_spline', CubicSpline(self.omega, self.values))

@@ -3,13 +3,16 @@
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
 from rotorsoil_ros.units import rad_s_to_rpm
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,9 @@ class SpeedTable:
                                  f'got {self.values.tolist()}')
 
     @cached_property
-    def _curve(self) -> PchipInterpolator:
+    def _curve(self) -> 'PchipInterpolator':
+        from scipy.interpolate import PchipInterpolator  # as slow to import as half of a start
+
         return PchipInterpolator(self.speed, self.values, axis=0, extrapolate=False)
 
     def __call__(self, speed: FloatArray) -> FloatArray:
