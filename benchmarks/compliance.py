@@ -5,7 +5,7 @@ Tabulates each geometry in a process of its own and prints CPU seconds of one co
 exact solves, unknowns, milliseconds per solve, the share of each step, the error measured at
 unseen frequencies, and the largest memory of the process; then what a rescaling costs.
 
-    python benchmarks/compliance.py [--poisson-ratio NU] [--loss-factor ETA] [--a0 MIN:MAX]
+    python -m benchmarks.compliance [--poisson-ratio NU] [--loss-factor ETA] [--a0 MIN:MAX]
 """
 
 import os

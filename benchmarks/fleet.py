@@ -6,7 +6,7 @@ machines in one node process, reliable, each at 10 Hz, against one machine at th
 messages per second, and against a bare node with the same topics, in turns: latency, what was
 lost, CPU time per message, resident memory.
 
-    python benchmarks/fleet.py [--machines N] [--rate HZ] [--seconds S] [--rounds N] [--no-start]
+    python -m benchmarks.fleet [--machines N] [--rate HZ] [--seconds S] [--rounds N] [--no-start]
 """
 
 import argparse
@@ -18,7 +18,6 @@ import sys
 import tempfile
 import time
 
-from node import BARE, cpu_seconds, process, resident_mib
 import numpy as np
 import rclpy
 from rclpy.context import Context
@@ -29,6 +28,8 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.case.loading import load_all
+
+from benchmarks.node import BARE, cpu_seconds, process, resident_mib
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 POISSON_RATIOS = (0.25, 0.35, 0.45)

@@ -1,7 +1,7 @@
 """
 Measure look-ups, offline prediction end to end, and how fast the node starts and stops.
 
-    python benchmarks/lookup.py
+    python -m benchmarks.lookup
 """
 
 from dataclasses import replace

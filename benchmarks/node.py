@@ -7,7 +7,7 @@ without a log, with MCAP, and with MCAP and rerun. Prints the median over all ro
 and 99th percentile of the latency at several rates, CPU share at each, the sustained rate and
 resident memory; and their ratios to those of the bare node.
 
-    python benchmarks/node.py [--seconds S] [--rounds N]
+    python -m benchmarks.node [--seconds S] [--rounds N]
 """
 
 import argparse

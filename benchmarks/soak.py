@@ -7,7 +7,7 @@ against the prediction; does once per second of message time what the node does 
 resident memory and cost per message along the way. With `--machines N` the same number of
 messages is spread over N machines: the cost per message must not depend on it.
 
-    python benchmarks/soak.py [--messages N] [--machines N] [--no-log]
+    python -m benchmarks.soak [--messages N] [--machines N] [--no-log]
 """
 
 import argparse
