@@ -1,10 +1,12 @@
 # make demo   the main job, live: a node process and a replay process that talk DDS on this host
 # make test   lint, types and tests
-# Both make .venv first if it is missing or older than setup.py. PYTHON=... chooses the interpreter.
+# make docs   the site, in docs/_build/html, warnings as errors
+# make bench  every benchmark; the rotor's beside ROSS, which gets an environment of its own
+# Each makes .venv first if it is missing or older than setup.py. PYTHON=... chooses the interpreter.
 
 SHELL := /bin/sh
 .DELETE_ON_ERROR:
-.PHONY: demo test bench clean
+.PHONY: demo test docs bench clean
 
 # Several BLAS threads make the small solves of this package slower, not faster.
 export OMP_NUM_THREADS := 1
@@ -14,6 +16,9 @@ unexport PYTHONPATH AMENT_PREFIX_PATH
 
 BIN := .venv/bin
 INSTALLED := .venv/.installed
+DOCUMENTED := .venv/.documented
+ROSS := .ross/.installed
+INSTALL := -m pip install --quiet --disable-pip-version-check
 FITS := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 demo: $(INSTALLED)
@@ -24,11 +29,16 @@ test: $(INSTALLED)
 	$(BIN)/mypy
 	$(BIN)/python -m pytest
 
-bench: $(INSTALLED)
-	$(BIN)/python -m benchmarks
+docs: $(DOCUMENTED)
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_build/html
+	@echo 'docs/_build/html/index.html'
+
+bench: $(INSTALLED) $(ROSS)
+	ROSS_PYTHON=.ross/bin/python $(BIN)/python -m benchmarks
 
 clean:
-	rm -rf .venv build demo_output dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .venv .ross .lowest build demo_output dist docs/_build docs/api install log *.egg-info \
+	  .mypy_cache .pytest_cache .ruff_cache
 
 $(INSTALLED): setup.py
 	@for python in $(PYTHON) python3 python3.13 python3.12 python3.11; do \
@@ -40,5 +50,14 @@ $(INSTALLED): setup.py
 	fi; \
 	echo "installing into .venv with $$($$chosen --version): some minutes, once"; \
 	$$chosen -m venv --clear .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test,viewer]'
+	$(BIN)/python $(INSTALL) -e '.[ros,test,viewer]'
+	@touch $@
+
+$(DOCUMENTED): $(INSTALLED)
+	$(BIN)/python $(INSTALL) -e '.[docs]'
+	@touch $@
+
+$(ROSS): $(INSTALLED)
+	$(BIN)/python -m venv --clear .ross
+	.ross/bin/python $(INSTALL) '.[bench]'
 	@touch $@

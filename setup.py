@@ -38,15 +38,26 @@ setup(
         'pydantic>=2.5',
         'PyYAML>=6.0.1',
         'rich>=13.0',
-        'ros-jazzy-common-interfaces>=5.3',
-        'ros-jazzy-rclpy>=7.1',
-        'ros-rclpy[fastrtps]>=7.1',
         'scikit-fem>=10.0',
-        'scipy>=1.11',
+        'scipy>=1.11.1',
         'zstandard>=0.20',
     ],
     extras_require={
+        # ROSS brings plotly of another age along: an environment of its own is the best place.
+        'bench': ['plotly<6', 'ross-rotordynamics>=2.3'],
+        'docs': [
+            'furo>=2024.8.6',
+            'latex2mathml>=3.77',
+            'myst-parser>=4.0',
+            'numpydoc>=1.8',
+            'sphinx>=8.0',
+        ],
         'frames': ['pandas>=2.0', 'xarray>=2023.6'],
+        'ros': [
+            'ros-jazzy-common-interfaces>=5.3.6',
+            'ros-jazzy-rclpy>=7.1.6',
+            'ros-rclpy[fastrtps]>=7.1.6',
+        ],
         'viewer': ['rerun-sdk>=0.38'],
         'test': [
             'cyclonedds>=11.0; sys_platform == "linux" and platform_machine == "x86_64"',

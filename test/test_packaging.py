@@ -1,16 +1,19 @@
 """The package as colcon and pip see it."""
 
 from importlib.resources import files
+import os
 from pathlib import Path
 import re
 import runpy
 import shutil
 import subprocess
 import sys
+import tarfile
 from xml.etree import ElementTree
 
 import pytest
 import setuptools
+import yaml
 
 import rotorsoil_ros
 
@@ -56,7 +59,7 @@ def test_both_worlds_know_the_same_package(arguments, package):
 
 def test_every_dependency_is_named_in_both_worlds(arguments, package):
     wanted = set()
-    for requirement in arguments['install_requires']:
+    for requirement in [*arguments['install_requires'], *arguments['extras_require']['ros']]:
         name = re.match(r'[\w-]+', requirement)[0]
         assert name == 'setuptools' or '>=' in requirement
         wanted |= ROS_NAMES.get(name, {f'python3-{name}'})
@@ -117,6 +120,65 @@ def test_build_holds_cases_and_types(tmp_path):
     assert {path.relative_to(package) for path in package.rglob('*.py')} == {
         path.relative_to(ROOT / 'rotorsoil_ros')
         for path in (ROOT / 'rotorsoil_ros').rglob('*.py')}
+
+
+def test_every_version_and_figure_of_the_package_is_said_once_or_alike(package):
+    version = rotorsoil_ros.__version__
+    citation = yaml.safe_load((ROOT / 'CITATION.cff').read_text())
+    assert str(citation['version']) == version == package.findtext('version')
+    assert citation['license'] == package.findtext('license')
+    assert citation['title'] == package.findtext('name')
+    assert {'authors', 'title', 'type'} <= set.intersection(*map(set, citation['references']))
+
+
+@pytest.fixture(scope='module')
+def unpacked(tmp_path_factory):
+    """Return the source distribution, unpacked, and made from a copy of the repository."""
+    source = tmp_path_factory.mktemp('source') / 'copy'
+    shutil.copytree(ROOT, source, symlinks=True, ignore=shutil.ignore_patterns(
+        '.venv', '.git', '.ross', '.lowest', '.*_cache', 'build', 'dist', 'install', 'log',
+        '__pycache__', '*.egg-info', 'demo_output', '_build', 'api'))
+    done = subprocess.run(
+        [sys.executable, 'setup.py', '--quiet', 'sdist', '--dist-dir', str(source.parent)],
+        cwd=source, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    [archive] = source.parent.glob('*.tar.gz')
+    with tarfile.open(archive) as content:
+        content.extractall(source.parent / 'unpacked', filter='data')
+    [top] = (source.parent / 'unpacked').iterdir()
+    return top
+
+
+def test_source_distribution_holds_what_the_repository_holds(unpacked):
+    listed = subprocess.run(['git', 'ls-files'], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode != 0:
+        pytest.skip('not a git checkout')
+    kept = {str(path.relative_to(unpacked)) for path in unpacked.rglob('*')}
+    forge = {'.gitignore', '.github/workflows/tests.yml', 'rotorsoil_ros/config'}
+    assert set(listed.stdout.splitlines()) - kept - forge == set()
+    assert sorted(path.name for path in (unpacked / 'rotorsoil_ros' / 'config').iterdir()) == [
+        path.name for path in CASES]
+
+
+def test_source_distribution_passes_its_tests(unpacked):
+    environment = {**os.environ, 'PYTHONPATH': str(unpacked)}
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-q', 'test/test_units.py', 'test/test_verification.py',
+         'test/test_repository.py', 'test/rotor', 'test/case/test_plant_fan.py'],
+        cwd=unpacked, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    assert 'skipped' not in done.stdout
+
+
+def test_forge_and_ci_call_what_make_calls():
+    workflow = yaml.safe_load((ROOT / '.github' / 'workflows' / 'tests.yml').read_text())
+    matrix = workflow['jobs']['test']['strategy']['matrix']['python']
+    assert matrix == ['3.11', '3.12', '3.13']
+    steps = [step.get('run', '') for job in workflow['jobs'].values() for step in job['steps']]
+    assert {'make test PYTHON=python', 'make docs PYTHON=python', '.ci/lowest'} <= set(steps)
+    assert 'make test' in (ROOT / '.ci' / 'run').read_text()
+    targets = set(re.findall(r'^(\w+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
+    assert {'demo', 'test', 'docs', 'bench', 'clean'} <= targets
 
 
 def test_launch_file_is_python():
