@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import TypeAlias
+from enum import IntEnum, StrEnum
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
@@ -71,7 +72,7 @@ class Measured:
         Name of the machine; `amplitude` (zero-to-peak) or `phase` [rad].
     stamp_ns : (n,) int array
         When it was measured [ns].
-    channels : tuple of str
+    channels : tuple of Channel
         Where it was measured.
     displacement, velocity : (n, channels) float array
         Amplitude or phase of the displacement [m, rad] and of the velocity [m/s, rad/s];
@@ -82,7 +83,7 @@ class Measured:
     machine: str
     quantity: str
     stamp_ns: IntArray
-    channels: tuple[str, ...]
+    channels: tuple[Channel, ...]
     displacement: FloatArray
     velocity: FloatArray
 
@@ -112,12 +113,13 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Raw acceleration (n,) [m/s^2] of one channel at its stamps (n,) [ns]."""
+    """Raw acceleration (n,) [m/s^2] of one channel at its stamps (n,) [ns]; computed or not."""
 
     machine: str
     channel: Channel
     stamp_ns: IntArray
     acceleration: FloatArray
+    is_synthetic: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +143,7 @@ class Demodulated:
     """
 
     machine: str
-    channel: str
+    channel: Channel
     stamp_ns: IntArray
     speed: FloatArray
     orders: tuple[int, ...]
@@ -171,6 +173,8 @@ class Compared:
         [m, rad]; NaN where the table has a gap.
     low, high : (n, channels) float array
         Band of the predicted amplitude, NaN where none is known.
+    behind, ahead : (n, channels) float array
+        Band of the predicted phase about that of the prediction [rad], likewise.
 
     """
 
@@ -184,12 +188,62 @@ class Compared:
     predicted: ComplexArray
     low: FloatArray
     high: FloatArray
+    behind: FloatArray
+    ahead: FloatArray
 
     @property
     def residual(self) -> FloatArray:
         """Amplitude of measured minus predicted, (n, channels) [m, rad]."""
         measured = self.amplitude * np.exp(1j * self.phase)
         return np.asarray(np.abs(measured - self.predicted))
+
+
+class Reason(StrEnum):
+    """Why a measured point is not held against its prediction."""
+
+    USED = ''
+    NOT_FINITE = 'measured value is negative or not finite'
+    NO_SPEED = 'no speed reported near its stamp'
+    OUT_OF_TABLE = 'outside the speed range of the prediction'
+    NO_PREDICTION = 'channel or speed has no prediction'
+    SLOW_ROLL = 'slow roll, taken as runout'
+    BELOW_NOISE = 'below noise'
+    NOT_QUASI_STATIC = 'not quasi-static'
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """
+    Whether compared points count, decided when their passage is over.
+
+    Attributes
+    ----------
+    compared : Compared
+        The points; NaN as their speed where none was told near them.
+    rate : (n,) float array
+        Of the speed [rad/s^2].
+    reason : (n, channels) array of Reason
+        Why a point does not count; USED where it does.
+
+    """
+
+    compared: Compared
+    rate: FloatArray
+    reason: npt.NDArray[Any]
+
+    @property
+    def machine(self) -> str:
+        """Name of the machine."""
+        return self.compared.machine
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """By what the machine is judged from `stamp_ns` on: criteria as plain arrays."""
+
+    machine: str
+    stamp_ns: int
+    criteria: Mapping[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +293,6 @@ class Model:
 
 
 Event: TypeAlias = (
-    Predicted | Measured | Band | Samples | Demodulated | Compared | Zoned | Remark | Diagnostics
-    | Model)
+    Predicted | Measured | Band | Samples | Demodulated | Compared | Weighed | Expected | Zoned
+    | Remark | Diagnostics | Model)
 Sink: TypeAlias = Callable[[Event], None]

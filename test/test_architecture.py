@@ -38,10 +38,8 @@ LONGEST_ROOM, SHORTEST_ROOM = 400, 60
 UNDER_WAY = {
     'rotorsoil_ros.bags.retention', 'rotorsoil_ros.case.loading', 'rotorsoil_ros.cli.demo',
     'rotorsoil_ros.cli.pictures',
-    'rotorsoil_ros.monitor.identification',
     'rotorsoil_ros.case.writer',
-    'rotorsoil_ros.monitor.peak_pairs', 'rotorsoil_ros.monitor.rules',
-    'monitor', 'twice',
+    'rotorsoil_ros.monitor.identification', 'machine', 'twice',
 }
 
 

@@ -12,8 +12,8 @@ import re
 import numpy as np
 import pytest
 
+from rotorsoil_ros.bags.comparison import compare
 from rotorsoil_ros.bags.profile import import_run_up
-from rotorsoil_ros.bags.run import read_run, Reading
 from rotorsoil_ros.bags.synthetic import on_ground, Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.config import load
@@ -21,10 +21,8 @@ from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.figures.comparison import all_figures
-from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.identification import identify_case, Wanted
-from rotorsoil_ros.monitor.rules import Rules
-from rotorsoil_ros.monitor.verdict import compare as judge, Verdict
+from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
@@ -87,9 +85,7 @@ def summary(directory):
 
 def judged(log, case=FAN):
     """Return the comparison of a log with a case, without files and pictures."""
-    rules = Rules()
-    expectation = Expectation.of(load(Path(case)), Path(log).parent / 'cache')
-    return judge(read_run(Path(log), Reading()), expectation, rules)
+    return compare(Path(log), Path(case), cache_directory=Path(log).parent / 'cache')
 
 
 @pytest.fixture(scope='module')
@@ -323,19 +319,27 @@ def test_log_of_an_answered_run_knows_its_case(kit_log, tmp_path, capsys):
                for line in summary(changed)['remarks'])
 
 
-def test_without_a_case_it_does_what_can_be_done(kit_log, tmp_path, capsys):
-    answered = tmp_path / 'answered.mcap'
-    case = tmp_path / 'my_kit.yaml'
-    case.write_text(Path(KIT).read_text().replace('name: rk4_rotor_kit', 'name: my_kit'))
-    assert main(['predict', str(case), kit_log, '-o', str(answered)]) == 0
-    assert main(['compare', str(answered), '-o', str(tmp_path / 'out')]) == 1
-    assert 'note: no case given' in capsys.readouterr().out
-    assert summary(tmp_path / 'out')['case'] is None
+def test_log_carries_its_case_and_the_files_that_it_names(kit_log, tmp_path, capsys):
+    table = tmp_path / 'measured_ground.csv'
+    table.write_text('hz,xx_re,xx_im,zz_re,zz_im\n0,8e8,0,9e8,0\n40,7e8,6e7,8e8,7e7\n')
+    case = tmp_path / 'own_fan.yaml'
+    text = re.sub(r'support:\n(  .*\n)+', 'support: {model: table, file: measured_ground.csv}\n',
+                  Path(FAN).read_text())
+    case.write_text(text)
+    log, answered = write_vectors(tmp_path / 'log.mcap'), tmp_path / 'answered.mcap'
+    given = judged(log, case)
+    assert main(['predict', str(case), log, '-o', str(answered)]) == 0
+    case.unlink()
+    table.unlink()
+    own = compare(answered, cache_directory=tmp_path / 'cache')
+    assert (own.verdict, own.failures) == (given.verdict, given.failures)
+    for one, other in zip(own.points, given.points, strict=True):
+        np.testing.assert_array_equal(one.predicted, other.predicted)
 
 
 @pytest.mark.parametrize('arguments, problem', [
     (['nothing.mcap'], 'nothing.mcap: no such file or bag directory'),
-    (['{log}'], 'plant_fan: the log holds no prediction; give the CASE'),
+    (['{log}'], '{log}: does not carry the case it was answered with; give the CASE'),
     (['{log}', FAN, '--machine', 'pump'], '{log}: must tell the speed of pump on joint_states'),
     (['{log}', 'nothing.yaml'], 'nothing.yaml: cannot be read'),
     (['{log}', '--set', 'a=1'], '--set: needs the CASE that it overrides'),
@@ -360,9 +364,6 @@ def test_soil_under_infinite_elements_is_identified_on_its_table(tmp_path):
     case = load(Path(FAN), overrides)
     model = coupled_model(case, tmp_path)
     log = write_vectors(tmp_path / 'log.mcap', factor=0.6, noise=0.05, model=model)
-    rules = Rules()
-    found = judge(read_run(Path(log), Reading()), Expectation.of(case, tmp_path),
-                  rules)
-    known = identify_case(found, Wanted(scalars=['soil.shear_modulus'], planes=['wheel']),
-                          overrides=overrides)
+    found = compare(Path(log), case, cache_directory=tmp_path)
+    known = identify_case(found, Wanted(scalars=['soil.shear_modulus'], planes=['wheel']))
     assert known.scalars.factor[0] == pytest.approx(0.6, rel=0.05)

@@ -1,7 +1,8 @@
 """Which machine a case file describes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,10 @@ class Case:
         How far the soil may be from what the file says.
     zones : ZoneLimits
         Of housing velocity.
+    content : mapping
+        The document that it was built from, settings on top included.
+    files : mapping of str to str
+        What the files say that the document names.
 
     """
 
@@ -72,6 +77,14 @@ class Case:
     tables: tuple[ComplianceTable, ...] = ()
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
+    content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+    def changed(self, overrides: Sequence[str]) -> 'Case':
+        """Return this case with settings on top, as `load` takes them."""
+        content = deepcopy(dict(self.content))
+        document.override(content, overrides)
+        return case_of(self.path, content, files=self.files)
 
 
 # Natural modes above the running speed and excitation at twice the speed need the soil too.
@@ -119,14 +132,28 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Case:
     return case_of(path, content)
 
 
-def case_of(path: Path, content: dict[str, Any]) -> Case:
-    """Return the machine of a document, as `load`; the path is what errors name."""
+def case_of(
+    path: Path, content: dict[str, Any], *, files: Mapping[str, str] | None = None,
+) -> Case:
+    """
+    Return the machine of a document, as `load`.
+
+    Parameters
+    ----------
+    path : Path
+        What errors name; files that the document names lie beside it.
+    content : dict
+        The document.
+    files : mapping of str to str
+        What such files say, where that came with the document.
+
+    """
     try:
         entries = schema.Document.model_validate(content)
     except ValidationError as error:
         place, problem = schema.first_fault(error)
         raise InputError(message(path, place, problem)) from error
-    return _Builder(Faults(path, entries)).case()
+    return _Builder(Faults(path, entries), content, dict(files or {})).case()
 
 
 @dataclass(frozen=True)
@@ -134,6 +161,8 @@ class _Builder:
     """Builds the physics of a document and says at which key it was refused."""
 
     faults: Faults
+    content: Mapping[str, Any]
+    files: dict[str, str]
 
     def case(self) -> Case:
         entries = self.faults.entries
@@ -149,7 +178,7 @@ class _Builder:
             foundations=self._foundations(rotor), rotor=rotor, unbalance=unbalances.total(),
             couples=unbalances.couples(), speed_range=speed_range,
             tables=self._tables(speed_range), uncertainty=self._uncertainty(),
-            zones=self._zones())
+            zones=self._zones(), content=self.content, files=self.files)
         with self.faults.at('rotor', entry=entries.rotor):
             CoupledModel(rotor, case.foundations, [RigidSoil() for _ in case.foundations])
         self._refuse_unreachable_soil(case)
@@ -196,7 +225,9 @@ class _Builder:
                                                                    'table needs it')
             # A path means the same wherever the program is called.
             path = self.faults.path.parent / file
-            tables.append(stiffness_file.read(path, speed_range))
+            if file not in self.files:
+                self.files[file] = stiffness_file.text_of(path)
+            tables.append(stiffness_file.read(path, speed_range, text=self.files[file]))
         return tuple(tables)
 
     def _refuse_unreachable_soil(self, case: Case) -> None:

@@ -298,6 +298,8 @@ class Machine:
                 disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
                 for disc, value in zip(self.table.planes, unbalance, strict=True)},
             'units': UNITS,
+            # All that is needed to compare the log with the case again.
+            'document': self.case.content, 'files': self.case.files,
         }
 
     def _compliance_keys(self) -> dict[str, str]:

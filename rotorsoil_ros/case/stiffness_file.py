@@ -28,7 +28,7 @@ _PLACES = 8
 _ROUND_OFF = 1e-12
 
 
-def read(path: Path, covering: tuple[float, float]) -> ComplianceTable:
+def read(path: Path, covering: tuple[float, float], *, text: str | None = None) -> ComplianceTable:
     """
     Read the dynamic stiffness of a massless contact and return what it gives way by.
 
@@ -40,6 +40,8 @@ def read(path: Path, covering: tuple[float, float]) -> ComplianceTable:
         cannot move. Of two entries ij and ji one is enough.
     covering : tuple of two floats
         Frequencies that it has to know [rad/s].
+    text : str or None
+        What the file says, where that is known already; the path then only names it.
 
     Raises
     ------
@@ -48,7 +50,7 @@ def read(path: Path, covering: tuple[float, float]) -> ComplianceTable:
         does not cover what it has to.
 
     """
-    columns = _columns(path)
+    columns = _columns(path, text_of(path) if text is None else text)
     omega = _frequencies(path, columns, covering)
     stiffness = _matrices(path, columns, len(omega))
     free = _free_dofs(path, stiffness)
@@ -73,16 +75,20 @@ def read(path: Path, covering: tuple[float, float]) -> ComplianceTable:
         raise InputError(f'{path}: {error}') from error
 
 
-def _columns(path: Path) -> dict[str, FloatArray]:
-    """Return the numbers below each heading; NaN where a cell is empty."""
+def text_of(path: Path) -> str:
+    """Return what a file says; an InputError tells why it cannot be read."""
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             raise InputError(f'{path}: must be smaller than {_LARGEST_BYTES} bytes')
-        text = path.read_text(encoding='utf-8-sig')
+        return path.read_text(encoding='utf-8-sig')
     except OSError as error:
         raise InputError(f'{path}: cannot be read: {error.strerror}') from error
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') from error
+
+
+def _columns(path: Path, text: str) -> dict[str, FloatArray]:
+    """Return the numbers below each heading; NaN where a cell is empty."""
     lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), start=1)
              if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#')]
     if not lines:

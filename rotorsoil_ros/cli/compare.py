@@ -3,25 +3,20 @@
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 import csv
-from dataclasses import replace
-from importlib.resources import as_file, files
 import io
 import json
 import math
 from pathlib import Path
 
-from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP
+from rotorsoil_ros.case.zone_limits import ISO_10816_3
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
 from rotorsoil_ros.figures.report import channel_table, exclusions, page, peak_table, zone_table
-from rotorsoil_ros.machine.band import SoilSpread
-from rotorsoil_ros.monitor.criteria import Expectation
-from rotorsoil_ros.monitor.points import Matching
-from rotorsoil_ros.monitor.rules import Rules
-from rotorsoil_ros.monitor.verdict import compare as judge, Comparison, Run, Verdict
+from rotorsoil_ros.monitor.comparison import Comparison
+from rotorsoil_ros.monitor.rules import Matching
+from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rpm_to_rad_s
 
 _VERDICT_FAILS = 1
@@ -30,13 +25,20 @@ _DPI = 110
 
 def compare(arguments: Namespace) -> int:
     """Hold a log against its prediction; write tables, pictures and a report; print a verdict."""
-    from rotorsoil_ros.bags.run import read_run, Reading
+    from rotorsoil_ros.bags.comparison import compare as judged, Wish
 
-    with progress('reading') as _:
-        run = read_run(arguments.log, Reading(machine=arguments.machine or ''))
-    with progress('solving') as _:
-        expectation = _expectation(arguments, run)
-        comparison = judge(run, expectation, _rules(arguments, expectation))
+    slow_roll = arguments.slow_roll_rpm
+    wish = Wish(
+        machine=arguments.machine or '',
+        matching=Matching(
+            tolerance=arguments.tolerance_s,
+            slow_roll_speed=math.nan if slow_roll is None else rpm_to_rad_s(slow_roll),
+            noise=1e-6 * arguments.noise_um),
+        amplitude_margin=arguments.margin, soil_factor=arguments.soil_factor,
+        zones=None if arguments.zone_group is None else ISO_10816_3[arguments.zone_group])
+    with progress('comparing') as report:
+        comparison = judged(arguments.log, _case(arguments), wish,
+                            cache_directory=arguments.cache, progress=report)
     lines = list(_identification(arguments, comparison))
     out: Path = arguments.output
     out.mkdir(parents=True, exist_ok=True)
@@ -44,50 +46,19 @@ def compare(arguments: Namespace) -> int:
     for line in lines:
         print(line)
     with progress('drawing') as _:
-        _write(comparison, out, source=str(arguments.log), identification=lines)
+        write_report(comparison, out, source=str(arguments.log), identification=lines)
     print(f'report    {out / "report.html"}')
     print(f'verdict   {comparison.verdict}')
     return 0 if comparison.verdict == Verdict.PASSES else _VERDICT_FAILS
 
 
-def _rules(arguments: Namespace, expectation: Expectation | None) -> Rules:
-    slow_roll, group = arguments.slow_roll_rpm, arguments.zone_group
-    zones = ISO_10816_3[group or USUAL_GROUP]
-    if expectation is not None and group is None:
-        zones = expectation.case.zones
-    return Rules(
-        matching=Matching(
-            tolerance=arguments.tolerance_s,
-            slow_roll_speed=math.nan if slow_roll is None else rpm_to_rad_s(slow_roll),
-            noise=1e-6 * arguments.noise_um),
-        amplitude_margin=arguments.margin, zones=zones)
-
-
-def _expectation(arguments: Namespace, run: Run) -> Expectation | None:
-    """Return the case that is given, or the one of the package that the log was answered with."""
-    directory = cache.directory(arguments.cache)
+def _case(arguments: Namespace) -> Case | None:
+    """Return the case that is given; None: the log carries its own."""
     if arguments.case is not None:
-        case = load(arguments.case, arguments.overrides)
-        return Expectation.of(case, directory, _spread(arguments, case))
+        return load(arguments.case, arguments.overrides)
     if arguments.overrides:
         raise InputError('--set: needs the CASE that it overrides')
-    name, tables = run.description.get('case'), run.description.get('tables')
-    own = files('rotorsoil_ros') / 'config' / f'{name}.yaml'
-    if not (isinstance(name, str) and name.isidentifier() and isinstance(tables, dict)
-            and own.is_file()):
-        return None
-    with as_file(own) as path:
-        case = load(path)
-        key = models.response_key(case, models.coupled_model(case, directory))
-        if key != tables.get('response'):
-            return None
-        return Expectation.of(case, directory, _spread(arguments, case))
-
-
-def _spread(arguments: Namespace, case: Case) -> SoilSpread:
-    factor = arguments.soil_factor
-    return case.uncertainty if factor is None else replace(
-        case.uncertainty, shear_modulus_factor=factor)
+    return None
 
 
 def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[str]:
@@ -97,15 +68,13 @@ def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[st
         return
     from rotorsoil_ros.monitor.identification import describe, identify_case, Wanted, write_case
 
-    if comparison.expectation is None:
-        raise InputError('--identify: needs the CASE')
     wanted = Wanted(
         scalars=arguments.identify, planes=arguments.plane,
         growth=arguments.identify_growth, runout=arguments.identify_runout,
         with_transients=arguments.with_transients)
     with progress('identifying') as _:
         try:
-            found = identify_case(comparison, wanted, overrides=arguments.overrides)
+            found = identify_case(comparison, wanted)
         except RotorSoilError as error:
             if isinstance(error, InputError):
                 raise
@@ -117,9 +86,10 @@ def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[st
         yield f'updated case {arguments.write_case}'
 
 
-def _write(
-    comparison: Comparison, out: Path, *, source: str, identification: Sequence[str],
+def write_report(
+    comparison: Comparison, out: Path, *, source: str, identification: Sequence[str] = (),
 ) -> None:
+    """Write tables, pictures and the report of a comparison into a directory."""
     with (out / 'comparison.csv').open('w', encoding='utf-8', newline='') as stream:
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(HEADER)

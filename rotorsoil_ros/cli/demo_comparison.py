@@ -1,26 +1,25 @@
 """Is what was put into synthetic signals found again? A comparison that needs no plant."""
 
-from argparse import Namespace
-from contextlib import redirect_stdout
 from importlib.resources import as_file, files
 from importlib.util import find_spec
-import json
 from pathlib import Path
 
 import numpy as np
 
+from rotorsoil_ros.bags.comparison import compare
 from rotorsoil_ros.bags.predict import predict
-from rotorsoil_ros.bags.run import read_run, Reading
 from rotorsoil_ros.bags.synthetic import profile, Truth, write_synthetic
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.cli.compare import compare
-from rotorsoil_ros.cli.parser import parser
+from rotorsoil_ros.cli.compare import write_report
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.monitor.criteria import Expectation
-from rotorsoil_ros.monitor.identification import Identification, identify_case, Wanted
-from rotorsoil_ros.monitor.rules import Rules
-from rotorsoil_ros.monitor.verdict import compare as judge, Comparison
+from rotorsoil_ros.monitor.comparison import Comparison
+from rotorsoil_ros.monitor.identification import (
+    describe,
+    Identification,
+    identify_case,
+    Wanted,
+)
 from rotorsoil_ros.screen import recorder
 
 CASE, PLANE, SOIL = 'plant_fan', 'wheel', 'soil.shear_modulus'
@@ -55,35 +54,24 @@ def demonstrate_comparison(out: Path, directory: Path, *, start_ns: int) -> None
         with progress('answering') as report:
             predict(machine, signals, log, progress=report,
                     screen=recorder(recording, machine) if recording else None)
-        verdict = _report(log, path, out, directory)
+        with progress('comparing') as report:
+            comparison = compare(log, cache_directory=directory, progress=report)
         with progress('identifying') as _:
-            comparison = _compare(log, machine, directory)
             found = identify_case(comparison, _WANTED)
+        with progress('drawing') as _:
+            write_report(comparison, out, source=str(log), identification=list(describe(found)))
     _print(found, comparison, start_ns=start_ns)
-    print(f'verdict   {verdict}')
+    print(f'verdict   {_verdict(comparison)}')
     print(f'report    {out / "report.html"}')
     if recording is not None:
         print(f'recording {recording}   (rerun {recording})')
 
 
-def _report(log: Path, case: Path, out: Path, directory: Path) -> str:
-    """Run the verb `compare`, whose tables would be too much on a terminal; return its verdict."""
-    arguments: Namespace = parser().parse_args([
-        'compare', str(log), str(case), '-o', str(out), '--cache', str(directory),
-        '--plane', PLANE, '--identify', SOIL, '--identify-growth'])
-    with (out / 'comparison.txt').open('w', encoding='utf-8') as stream, redirect_stdout(stream):
-        compare(arguments)
-    summary = json.loads((out / 'comparison.json').read_text(encoding='utf-8'))
-    said, failures = str(summary['verdict']), summary['failures']
+def _verdict(comparison: Comparison) -> str:
+    said, failures = str(comparison.verdict), comparison.failures
     if failures:
         said += f': {failures[-1]}'
     return said + (f' (and {len(failures) - 1} more)' if len(failures) > 1 else '')
-
-
-def _compare(log: Path, machine: Machine, directory: Path) -> Comparison:
-    """Compare as the verb does, which prints its numbers but does not return them."""
-    expectation = Expectation.of(machine.case, directory)
-    return judge(read_run(log, Reading()), expectation, Rules(zones=machine.case.zones))
 
 
 def put_in(comparison: Comparison, moment: float, *, start_ns: int) -> tuple[float, float]:
@@ -96,14 +84,13 @@ def put_in(comparison: Comparison, moment: float, *, start_ns: int) -> tuple[flo
 
 
 def _print(found: Identification, comparison: Comparison, *, start_ns: int) -> None:
-    assert comparison.expectation is not None
     assert found.scalars is not None
     case = comparison.expectation.case
     given = float(np.abs(case.unbalance[comparison.expectation.table.planes.index(PLANE)]))
     first, last = put_in(comparison, given, start_ns=start_ns)
     start, growth = (complex(found.unbalance.moment[found.columns.index(name)])
                      for name in (PLANE, f'growth of {PLANE}'))
-    print(f'{CASE}: SYNTHETIC sensors of {comparison.reference.time[-1]:.0f} s, '
+    print(f'{CASE}: SYNTHETIC sensors of {comparison.run.time[-1]:.0f} s, '
           'compared with the case')
     print(f'  {"":44s} {"put in":>8s} {"found":>8s}')
     for name, truth, value in (

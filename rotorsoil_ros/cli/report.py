@@ -24,9 +24,9 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.margins import asked
 from rotorsoil_ros.machine.mode_names import ModeNames
 from rotorsoil_ros.machine.modes import critical_speeds
+from rotorsoil_ros.machine.peaks import resonances
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.stability import Stability
-from rotorsoil_ros.monitor.peaks import resonances
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Amplification factor below which a critical speed needs no margin (API 617).

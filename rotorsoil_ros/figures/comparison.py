@@ -11,12 +11,11 @@ import numpy as np
 from rotorsoil_ros.arrays import BoolArray, FloatArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.figures.response import COLOURS
-from rotorsoil_ros.machine.band import Envelope
+from rotorsoil_ros.machine.peaks import resolved_speeds
+from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.criteria import answer, Expectation
 from rotorsoil_ros.monitor.passage import Passage, PeakPair
-from rotorsoil_ros.monitor.peaks import resolved_speeds
 from rotorsoil_ros.monitor.points import ChannelPoints
-from rotorsoil_ros.monitor.verdict import Comparison
 from rotorsoil_ros.units import rad_s_to_rpm
 
 PREDICTED, MEASURED, LEFT_OUT = COLOURS[0], COLOURS[1], '#9a9a9a'
@@ -29,10 +28,9 @@ _MOST_LINES = 6
 
 def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
     """Yield file name, caption and figure of every picture."""
-    envelope = _envelope(comparison.expectation)
     for points in comparison.points:
         yield (f'bode_{points.channel}', f'{points.channel}: amplitude and phase over speed',
-               bode(comparison, points, envelope))
+               bode(comparison, points))
         if np.isfinite(points.phase).any():
             yield (f'polar_{points.channel}', f'{points.channel}: the vectors',
                    polar(points, comparison.run.title))
@@ -40,17 +38,11 @@ def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
     yield 'residuals', 'Measured less predicted vectors', residuals(comparison)
 
 
-def _envelope(expectation: Expectation | None) -> Envelope | None:
-    if expectation is None or expectation.band is None:
-        return None
-    return expectation.envelope(expectation.case.unbalance)
-
-
 def _unit(channel: Channel) -> str:
     return f'u{channel.unit}'
 
 
-def bode(comparison: Comparison, points: ChannelPoints, envelope: Envelope | None) -> Figure:
+def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
     """Draw amplitude and phase of a channel over speed: line, band, points used and left out."""
     figure = Figure(figsize=(7.5, 5.4), layout='constrained')
     amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
@@ -62,8 +54,7 @@ def bode(comparison: Comparison, points: ChannelPoints, envelope: Envelope | Non
         amplitude.plot(speed[chosen], measured[chosen], **style)
         phase.plot(speed[chosen], np.rad2deg(_wrapped(points.phase[chosen])),
                    **{**style, 'label': None})
-    if comparison.expectation is not None:
-        _draw_criticals(amplitude, comparison.expectation)
+    _draw_criticals(amplitude, comparison.expectation)
     if not np.isfinite(points.phase).any():
         phase.text(0.5, 0.9, 'no phase measured', transform=phase.transAxes, ha='center',
                    va='top', fontsize=8)
@@ -92,9 +83,9 @@ def _draw_prediction(
     given = np.isfinite(points.predicted)
     order = np.argsort(points.speed[given], kind='stable')
     speed, vector = points.speed[given][order], points.predicted[given][order]
-    if (expectation is not None and points.channel in expectation.table.channels
-            and _single_unbalance(comparison) and len(speed)):
-        predictor = expectation.table.predictor(_last_unbalance(comparison, expectation))
+    unbalances = comparison.run.unbalances
+    if points.channel in expectation.table.channels and len(unbalances) == 1 and len(speed):
+        predictor = expectation.table.predictor(unbalances[0][1])
         dense = resolved_speeds(predictor)
         dense = dense[(dense >= speed[0]) & (dense <= speed[-1])]
         if len(dense):
@@ -105,16 +96,6 @@ def _draw_prediction(
     degrees = np.rad2deg(np.angle(vector))
     jump = np.abs(np.diff(degrees, prepend=degrees[:1])) > 300.0
     phase.plot(rad_s_to_rpm(speed), np.where(jump, np.nan, degrees), **style)
-
-
-def _single_unbalance(comparison: Comparison) -> bool:
-    return len({tuple(sorted(planes.items(), key=lambda entry: entry[0]))
-                for _, planes in comparison.run.unbalances}) <= 1
-
-
-def _last_unbalance(comparison: Comparison, expectation: Expectation) -> Any:
-    logged = comparison.run.unbalances
-    return expectation.vector(logged[-1][1]) if logged else expectation.case.unbalance
 
 
 def _draw_band(amplitude: Axes, phase: Axes, points: ChannelPoints) -> None:
@@ -182,8 +163,8 @@ def trend(comparison: Comparison) -> Figure:
     shown = (housings or comparison.points)[:_MOST_LINES]
     figure = Figure(figsize=(7.5, 5.8), layout='constrained')
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 2.6])
-    start = comparison.reference.stamp_ns[0]
-    top.plot(comparison.reference.time, rad_s_to_rpm(comparison.reference.speed), color='black',
+    start = comparison.run.stamp_ns[0]
+    top.plot(comparison.run.time, rad_s_to_rpm(comparison.run.speed), color='black',
              linewidth=1.0)
     top.set_ylabel('speed [rpm]')
     for number, points in enumerate(shown):
@@ -276,12 +257,11 @@ def rows(comparison: Comparison) -> Iterator[tuple[str, ...]]:
 
 def document(comparison: Comparison) -> dict[str, Any]:
     """Return everything but the points, in SI units, None where there is no number."""
-    case = comparison.expectation.case if comparison.expectation else None
+    expectation, case = comparison.expectation, comparison.expectation.case
     content = {
         'machine': comparison.run.machine,
         'synthetic': comparison.run.is_synthetic,
-        'case': case.name if case else None,
-        'case_file': str(case.path) if case else None,
+        'case': case.name, 'case_file': str(case.path),
         'verdict': str(comparison.verdict),
         'failures': comparison.failures,
         'remarks': comparison.remarks,
@@ -291,14 +271,12 @@ def document(comparison: Comparison) -> dict[str, Any]:
             'amplitude_margin': comparison.rules.amplitude_margin,
             'inside_share': comparison.rules.inside_share,
             'critical_margin': comparison.rules.critical_margin,
-            'shear_modulus_factor': None if comparison.expectation is None else
-            comparison.expectation.spread.shear_modulus_factor,
+            'shear_modulus_factor': expectation.spread.shear_modulus_factor,
             'zones': comparison.rules.zones.label},
         'channels': {points.channel: {
             'points': len(points.stamp_ns), 'used': int(points.used.sum()),
             'excluded': points.excluded, 'amplitude_only': not points.has_phase,
-            'runout': None if math.isnan(points.runout.real) else {
-                'amplitude': abs(points.runout), 'phase_rad': float(np.angle(points.runout))},
+            'runout': _runout(comparison, points),
             'bias': figures.bias, 'scatter': figures.scatter, 'ratio': figures.ratio,
             'phase_bias_rad': figures.phase_bias, 'phase_scatter_rad': figures.phase_scatter,
             'r_squared': figures.r_squared, 'share_inside_band': figures.inside,
@@ -306,7 +284,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         } for points, figures in zip(comparison.points, comparison.statistics, strict=True)},
         'critical_speeds': [{
             'speed_rad_s': mode.speed, 'damping_ratio': mode.damping_ratio, 'whirl': mode.whirl,
-        } for mode in (comparison.expectation.criticals if comparison.expectation else ())],
+        } for mode in expectation.criticals],
         'peaks': [_peak(peak) for peak in comparison.peaks],
         'zones': [{
             'channel': entry.channel, 'source': entry.source, 'speed_rad_s': entry.speed,
@@ -318,6 +296,12 @@ def document(comparison: Comparison) -> dict[str, Any]:
     return plain
 
 
+def _runout(comparison: Comparison, points: ChannelPoints) -> dict[str, float] | None:
+    runout = comparison.runout.of(points.channel)
+    return None if math.isnan(runout.real) else {
+        'amplitude': abs(runout), 'phase_rad': float(np.angle(runout))}
+
+
 def _peak(peak: PeakPair) -> dict[str, Any]:
     def passage(found: Passage | None) -> dict[str, float] | None:
         return None if found is None else {
@@ -326,7 +310,7 @@ def _peak(peak: PeakPair) -> dict[str, Any]:
 
     return {'channel': peak.channel, 'predicted': passage(peak.predicted),
             'measured': passage(peak.measured), 'deviation': peak.deviation,
-            'largest_allowed_amplitude': peak.limit, 'quasi_static': peak.is_slow}
+            'largest_allowed_amplitude': peak.allowed.most, 'quasi_static': peak.is_slow}
 
 
 def _without_nan(value: Any) -> Any:

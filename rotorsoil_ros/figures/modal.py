@@ -15,8 +15,8 @@ from rotorsoil_ros.figures.response import COLOURS, draw_shape, FELT, tidy, titl
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import Campbell, campbell, critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.peaks import Peak, resolved_speeds
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
-from rotorsoil_ros.monitor.peaks import Peak, resolved_speeds
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 _SPEEDS = 121

@@ -15,8 +15,8 @@ from rotorsoil_ros.ground.soil import RigidSoil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import add_mass
 from rotorsoil_ros.machine.modes import campbell
+from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.monitor.peaks import resolved_speeds
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rad_s_to_rpm
 
 # Masses that the paper compares foundations with [kg], and their inertia about y [kg m^2]:

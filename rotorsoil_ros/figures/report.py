@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 import rotorsoil_ros
+from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.passage import Passage
-from rotorsoil_ros.monitor.verdict import Comparison, Verdict
+from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rad_s_to_rpm
 
 _STYLE = """
@@ -62,10 +63,10 @@ def page(
     """
     verdict = comparison.verdict
     title = f'{comparison.run.title}: predicted against measured'
-    case = comparison.expectation.case if comparison.expectation else None
+    case = comparison.expectation.case
     parts = [
         f'<h1>{escape(title)}</h1>',
-        f'<p>Log {escape(source)}; case {escape(str(case.path)) if case else "not given"}; '
+        f'<p>Log {escape(source)}; case {escape(case.name)}, {escape(str(case.path))}; '
         f'rotorsoil_ros {rotorsoil_ros.__version__}.</p>',
         f'<div class="verdict {verdict}"><b>{verdict}</b>: {_WORDS[verdict]}'
         f'{_list(comparison.failures)}</div>',
@@ -76,7 +77,7 @@ def page(
     parts.append(_list(exclusions(comparison)))
     if comparison.peaks:
         parts += ['<h2>Peaks</h2>', _table(*peak_table(comparison))]
-    if comparison.expectation and comparison.expectation.criticals:
+    if comparison.expectation.criticals:
         parts += ['<h2>Critical speeds of the model</h2>', _table(
             ['speed [rpm]', 'whirl', 'damping ratio'],
             [[f'{rad_s_to_rpm(mode.speed):.0f}', 'forward' if mode.whirl > 0 else 'backward',
@@ -121,7 +122,7 @@ def peak_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
         assert passed is not None
         rows.append([peak.channel, _speed(peak.predicted), _speed(peak.measured),
                      _number(100.0 * peak.deviation), _height(peak.predicted),
-                     _number(1e6 * peak.limit), _height(peak.measured),
+                     _number(1e6 * peak.allowed.most), _height(peak.measured),
                      _number(float(rad_s_to_rpm(passed.rate))),
                      _number(passed.number(peak.damping_ratio)),
                      'yes' if peak.is_slow else 'no'])

@@ -19,8 +19,8 @@ from rotorsoil_ros.ground.soil import Circle
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.peaks import Peak, resolved_speeds, resonances
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
-from rotorsoil_ros.monitor.peaks import Peak, resolved_speeds, resonances
 from rotorsoil_ros.rotor.shaft import Probe
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 

@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
@@ -22,7 +22,6 @@ from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
-from rotorsoil_ros.monitor.points import Reference
 from rotorsoil_ros.monitor.quasistatic import Resonance
 
 # Critical speeds are looked for between these multiples of the highest speed.
@@ -103,45 +102,12 @@ class Expectation:
         return np.array([unbalances.get(plane, 0.0) for plane in self.table.planes],
                         dtype=complex)
 
-    def reference(
-        self, stamp_ns: IntArray, speed: FloatArray,
-        unbalances: Sequence[tuple[int, ComplexArray]],
-        logged: ComplexArray | None = None,
-    ) -> Reference:
-        """
-        Return predictions and bands over a run.
-
-        Parameters
-        ----------
-        stamp_ns, speed : (m,) arrays
-            Reported speeds [ns], [rad/s].
-        unbalances : sequence of (int, (p,) complex array)
-            From which stamp on which unbalance [kg m]; the first also before it.
-        logged : (m, c) complex array or None
-            Displacements that a node answered; None to answer them now.
-
-        """
-        shape = len(speed), len(self.table.channels)
-        displacement = np.full(shape, complex(np.nan, np.nan))
-        bounds = np.full((4, *shape), np.nan)
-        starts = np.searchsorted(stamp_ns, [start for start, _ in unbalances])
-        starts[0] = 0
-        for begin, end, (_, unbalance) in zip(
-                starts, [*starts[1:], len(speed)], unbalances, strict=True):
-            part = slice(int(begin), int(end))
-            if logged is None:
-                displacement[part] = answer(self.table.predictor(unbalance), speed[part])
-            if self.band is not None and begin < end:
-                envelope = self.envelope(unbalance).at(speed[part])
-                bounds[:, part] = (envelope.low, envelope.high, envelope.behind, envelope.ahead)
-        return Reference(stamp_ns, speed, self.table.channels,
-                         displacement if logged is None else logged, bounds[0], bounds[1],
-                         bounds[2], bounds[3], self.table.speed_range)
-
-    def envelope(self, unbalance: ComplexArray) -> Envelope:
-        """Return the band under one unbalance [kg m]; only where there is a band."""
-        assert self.band is not None
-        return self.band.envelope(unbalance)
+    def criteria(self, unbalance: ComplexArray) -> 'Criteria':
+        """Return by what a measurement is judged under an unbalance, (p,) [kg m]."""
+        return Criteria(
+            None if self.band is None else self.band.envelope(unbalance),
+            tuple(self.resonances), (self.lowest_natural_speed('x'),
+                                     self.lowest_natural_speed('z')))
 
 
 def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
@@ -190,7 +156,7 @@ class Criteria:
         return arrays
 
     @classmethod
-    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> 'Criteria':
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> 'Criteria':
         """Rebuild criteria from `to_arrays`."""
         envelope = None
         if 'speed' in arrays:
@@ -238,10 +204,7 @@ def criteria(
     stored = stored_criteria(case, model, unbalance, directory)
     if stored is not None:
         return stored
-    solved = Expectation.of(case, directory)
-    found = Criteria(
-        None if solved.band is None else solved.envelope(unbalance), tuple(solved.resonances),
-        (solved.lowest_natural_speed('x'), solved.lowest_natural_speed('z')))
+    found = Expectation.of(case, directory).criteria(unbalance)
     Cache(directory).store(
         _KIND, criteria_key(case, model, unbalance), found.to_arrays())
     return found

@@ -1,6 +1,7 @@
 """Which unbalance, and which soil or bearing, explain a measured run of a case best."""
 
 from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -13,12 +14,13 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.errors import InputError, NotSolvedError
+from rotorsoil_ros.events import Reason
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.machine.band import depends_on_soil
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.identify import Identified, identify, identify_unbalance, Unbalance
-from rotorsoil_ros.monitor.points import ChannelPoints, Reason
-from rotorsoil_ros.monitor.verdict import Comparison
+from rotorsoil_ros.monitor.points import ChannelPoints
 
 # Before the run is seen, a scalar is known to within this factor, one standard deviation.
 PRIOR_FACTOR = 2.0
@@ -69,8 +71,6 @@ class Identification:
     ----------
     case : Case
         As it was described.
-    overrides : sequence of str
-        Settings on top of its file.
     scaled : tuple of (str, list of (str, float))
         Each wanted path with the key paths below it and their values in the case.
     columns : tuple of str
@@ -87,7 +87,6 @@ class Identification:
     """
 
     case: Case
-    overrides: Sequence[str]
     scaled: tuple[tuple[str, list[tuple[str, float]]], ...]
     columns: tuple[str, ...]
     unbalance: Unbalance
@@ -103,9 +102,7 @@ class Identification:
                 for setting in _settings(places, factor)]
 
 
-def identify_case(
-    comparison: Comparison, wanted: Wanted, *, overrides: Sequence[str] = (),
-) -> Identification:
+def identify_case(comparison: Comparison, wanted: Wanted) -> Identification:
     """
     Find unbalance and scalars of the case of a comparison.
 
@@ -115,8 +112,6 @@ def identify_case(
         With its case.
     wanted : Wanted
         What is to be found out.
-    overrides : sequence of str
-        Settings on top of the case file, as when it was compared.
 
     Raises
     ------
@@ -126,11 +121,8 @@ def identify_case(
         If the run cannot tell.
 
     """
-    expectation = comparison.expectation
-    if expectation is None:
-        raise InputError('identification needs the case')
-    case, nominal = expectation.case, expectation.model
-    scaled = _scaled(case.path, overrides, wanted.scalars)
+    case, nominal = comparison.expectation.case, comparison.expectation.model
+    scaled = _scaled(case, wanted.scalars)
     channels, elapsed, speed, measured = _vectors(comparison, wanted)
     for plane in wanted.planes:
         if plane not in nominal.planes:
@@ -144,7 +136,7 @@ def identify_case(
     def respond(factors: FloatArray) -> ComplexArray:
         settings = [setting for (_, places), factor in zip(scaled, factors.tolist(), strict=True)
                     for setting in _settings(places, factor)]
-        model = _rebuilt(load(case.path, [*overrides, *settings]), nominal)
+        model = _rebuilt(case.changed(settings), nominal)
         rows = [model.channels.index(name) for name in channels]
         response = np.stack([
             model.unbalance_response(speed, unit).displacement[:, rows]
@@ -159,10 +151,10 @@ def identify_case(
     used = int(np.isfinite(measured).sum())
     if not scaled:
         found = identify_unbalance(respond(np.ones(0)), measured)
-        return Identification(case, overrides, scaled, columns, found, None, used, channels)
+        return Identification(case, scaled, columns, found, None, used, channels)
     scalars = identify(respond, measured, names=list(wanted.scalars),
                        prior_deviation=math.log(PRIOR_FACTOR))
-    return Identification(case, overrides, scaled, columns, scalars.unbalance, scalars, used,
+    return Identification(case, scaled, columns, scalars.unbalance, scalars, used,
                           channels)
 
 
@@ -204,14 +196,13 @@ def _vectors(
 
 
 def _scaled(
-    path: Path, overrides: Sequence[str], scalars: Sequence[str],
+    case: Case, scalars: Sequence[str],
 ) -> tuple[tuple[str, list[tuple[str, float]]], ...]:
-    content = document.read(path)
-    document.override(content, overrides)
-    found = tuple((scalar, list(_numbers(content, scalar.split('.'), ()))) for scalar in scalars)
+    found = tuple((scalar, list(_numbers(case.content, scalar.split('.'), ())))
+                  for scalar in scalars)
     for scalar, places in found:
         if not any(value != 0.0 for _, value in places):
-            raise InputError(f'{path}: --identify {scalar}: names no number of the case')
+            raise InputError(f'{case.path}: --identify {scalar}: names no number of the case')
     return found
 
 
@@ -270,8 +261,8 @@ def describe(found: Identification) -> Iterator[str]:
 
 def write_case(found: Identification, target: Path) -> None:
     """Write the case file with what was identified; its comments are lost."""
-    content = document.read(found.case.path)
-    document.override(content, [*found.overrides, *found.settings])
+    content = deepcopy(dict(found.case.content))
+    document.override(content, found.settings)
     own = [entry for entry in content.get('unbalances') or []
            if entry['disc'] not in found.columns]
     content['unbalances'] = own + list(_entries(found))

@@ -1,67 +1,49 @@
 """Does the machine behave as predicted? Measured vectors against the answers, while it runs."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from difflib import get_close_matches
 import math
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from rotorsoil_ros.arrays import BoolArray, FloatArray, IntArray
-from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.events import (
     Band,
     Compared,
     Event,
+    Expected,
     Level,
     Measured,
     NANOSECONDS,
+    Reason,
     Remark,
     Samples,
+    Weighed,
 )
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.monitor.criteria import answer, Criteria
-from rotorsoil_ros.monitor.demodulation import Demodulator
-from rotorsoil_ros.monitor.history import History
-from rotorsoil_ros.monitor.pairing import Pairing, Runout, Vectors
-from rotorsoil_ros.monitor.passing import Passing
-from rotorsoil_ros.monitor.points import ABOVE_NOISE, Matching, nearest
-from rotorsoil_ros.monitor.quasistatic import is_quasi_static, SLOPE_SAMPLES
-from rotorsoil_ros.monitor.rules import Rules
-from rotorsoil_ros.monitor.told import Verdict
-from rotorsoil_ros.monitor.zones import Vibration
+from rotorsoil_ros.monitor.inside import BandShare
+from rotorsoil_ros.monitor.quasistatic import Pace
+from rotorsoil_ros.monitor.rules import Judging
+from rotorsoil_ros.monitor.sweep import Sweeps
+from rotorsoil_ros.monitor.vectors.demodulation import Demodulator
+from rotorsoil_ros.monitor.vectors.history import History
+from rotorsoil_ros.monitor.vectors.pairing import Pairing, Runout, Vectors
+from rotorsoil_ros.monitor.verdict import Account, Teller
+from rotorsoil_ros.monitor.zones import Zones
 
 MOST_NAMES = 16
 REPEAT_NS = NANOSECONDS  # after which a band is told again although the speed has not moved
 MOVED = 1e-3  # share of a speed
+SILENT_TICKS = 2  # without a new speed, after which nothing more is waited for
 
-
-@dataclass(frozen=True, slots=True)
-class Judging:
-    """
-    How measurements are held against predictions.
-
-    Attributes
-    ----------
-    rules : Rules
-        When a machine behaves as predicted.
-    turns : float
-        Turns of the rotor that make one vector of raw samples.
-    band_period_s : float
-        Message time between two bands while the speed changes; 0: one with every speed [s].
-
-    """
-
-    rules: Rules = field(default_factory=Rules)
-    turns: float = 10.0
-    band_period_s: float = 0.1
-
-    @classmethod
-    def of(cls, case: Case, *, matching: Matching | None = None, **other: float) -> 'Judging':
-        """Return how a case is judged."""
-        return cls(Rules(matching=matching or Matching(), zones=case.zones), **other)
+# Multiples of its standard error below which a vector is noise.
+ABOVE_NOISE = 3.0
 
 
 class Judge:
@@ -69,28 +51,38 @@ class Judge:
     Holds what is measured of one machine against what is predicted.
 
     Between ticks it only dates, joins and subtracts; what takes longer waits for the tick. As
-    in the monitor no clock is read, so that a replay is judged as the run was.
+    in the monitor no clock is read, and every decision hangs on stamps alone: a log is judged
+    as the run was.
     """
 
-    def __init__(self, machine: str, predictor: Predictor, judging: Judging) -> None:
+    def __init__(
+        self, machine: str, predictor: Predictor, judging: Judging, *,
+        hindsight: Mapping[str, complex] | None = None,
+    ) -> None:
         self.machine = machine
         self.history = History()
         self._judging = judging
-        self._criteria: Criteria | None = None
-        self._envelope: Envelope | None = None
         self._predictor = predictor
-        rules = judging.rules
-        self._pairing = Pairing(self.history, tolerance_s=rules.matching.tolerance)
-        self._runout = Runout(rules.matching.slow_roll_speed)
-        self._vibration = Vibration(rules)
-        self._passing = Passing(machine, self.history, margin=rules.critical_margin)
-        self._verdict = Verdict(machine, self._vibration, self._passing)
-        self._demodulators: dict[str, Demodulator] = {}
-        self._compared: list[Compared] = []
-        self._unknown: set[str] = set()
-        self._told: set[str] = set()
+        self._envelope: Envelope | None = None
+        self._pairing = Pairing(self.history, tolerance_s=judging.rules.matching.tolerance)
+        self.runout = Runout(judging.rules.matching.slow_roll_speed, hindsight)
+        self._demodulators: dict[Channel, Demodulator] = {}
+        self._paired: set[Channel] = set()
+        self._fresh: list[Compared] = []
+        self._heard: list[Compared] = []
+        self._silent_ticks = 0
+        self._pace: Pace | None = None
+        self._news: list[Criteria] = []
+        self._band = BandShare(judging.rules)
+        self._zones = Zones(judging.rules.zones, predictor.channels)
+        self._sweeps = Sweeps(machine, judging.rules)
+        self.account = Account(judging.rules, self._band, self._zones, self._sweeps)
+        self._teller = Teller(machine, self.account)
+        self._unknown: set[Channel] = set()
+        self._told: set[Channel] = set()
         self._band_ns = round(judging.band_period_s * NANOSECONDS)
         self._band_told = -REPEAT_NS, 0.0
+        self.is_synthetic = False
 
     def take_predictor(self, predictor: Predictor) -> None:
         """Judge by another unbalance, for which the band is not known yet."""
@@ -98,7 +90,12 @@ class Judge:
 
     def take_criteria(self, criteria: Criteria) -> None:
         """Judge by a band, resonances and natural speeds from now on."""
-        self._criteria, self._envelope = criteria, criteria.envelope
+        self._envelope = criteria.envelope
+        self._zones.natural = {axis: criteria.lowest_natural_speed(axis) for axis in ACROSS}
+        self._sweeps.resonances = criteria.resonances
+        if self._pace is None or self._pace.resonances != criteria.resonances:
+            self._pace = Pace(self.history, criteria.resonances)
+        self._news.append(criteria)
 
     def on_speed(self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> bool:
         """Note speeds [rad/s] and rotor angles [rad]; return whether `follow` has something."""
@@ -118,11 +115,13 @@ class Judge:
 
     def on_measured(self, measured: Measured) -> Iterator[Event]:
         """Yield the comparisons that a measurement completes."""
+        self._paired |= set(measured.channels)
         self._pairing.take(measured)
         yield from self._matched()
 
     def on_samples(self, samples: Samples) -> None:
         """Keep raw samples until the tick."""
+        self.is_synthetic |= samples.is_synthetic
         known = self._demodulators.get(samples.channel)
         if known is None:
             known = self._demodulators[samples.channel] = Demodulator(
@@ -131,27 +130,94 @@ class Judge:
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> Iterator[Event]:
         """Close the period since the last tick, and judge it."""
+        while self._news:
+            yield Expected(self.machine, now_ns, self._news.pop(0).to_arrays())
         for demodulator in self._demodulators.values():
             for found in demodulator.vectors():
                 yield found
-                self._pairing.take_demodulated(found)
+                if found.channel not in self._paired:  # vectors are told besides: they count
+                    self._pairing.take_demodulated(found)
         self._pairing.tick()
         yield from self._matched(is_tick=True)
-        criteria, compared = self._criteria, _joined(self._compared)
-        self._compared = []
-        if criteria is not None:
-            self._weigh(criteria, compared)
-            yield from self._passing.finished(now_ns, criteria.resonances)
+        heard, self._heard = self._heard, []
+        yield from self._settle(now_ns)
         yield from self._strangers(now_ns)
-        yield from self._verdict.tell(
-            now_ns, stale_after_s=stale_after_s, has_data=bool(compared),
-            has_phase=any(np.isfinite(each.phase).any() for each in compared),
+        yield from self._teller.tell(
+            now_ns, stale_after_s=stale_after_s, has_data=bool(heard),
+            has_phase=any(np.isfinite(each.phase).any() for each in heard),
             is_steady=self.history.is_steady, counts=self._counts())
 
     def finish(self, now_ns: int) -> Iterator[Event]:
-        """Judge the passage that the end of the run has cut short."""
-        if self._criteria is not None:
-            yield from self._passing.cut_short(now_ns, self._criteria.resonances)
+        """Judge what the end of the run has cut short."""
+        yield from self._settle(now_ns, is_last=True)
+        if self._pace is not None:
+            yield from self._counted(self._sweeps.finish(now_ns))
+            self._zones.close(math.inf)
+
+    def _settle(self, now_ns: int, *, is_last: bool = False) -> Iterator[Event]:
+        """Judge every point around which the speeds are known."""
+        if self._pace is None:
+            self._fresh = []  # without criteria nothing is judged
+            return
+        before = self._pace.settled_ns
+        stamps, speed = self._pace.follow(is_last=is_last)
+        self._silent_ticks = 0 if self._pace.settled_ns != before else self._silent_ticks + 1
+        if self._silent_ticks > SILENT_TICKS:
+            stamps, speed = self._pace.follow(is_last=True)
+        settled_ns = math.inf if is_last or self._silent_ticks > SILENT_TICKS else (
+            self._pace.settled_ns)
+        for weighed in self._dated(self._pace, settled_ns):
+            self._zones.take(weighed)
+            self._band.see(weighed)
+            self._sweeps.take(weighed)
+        yield from self._counted(self._sweeps.follow(
+            stamps, speed, now_ns if settled_ns == math.inf else int(settled_ns)))
+        self._zones.close(now_ns)
+        now = self.history.last_speed
+        if math.isfinite(now):
+            row = answer(self._predictor, np.array([now]))[0]
+            self._zones.predict(
+                {name: now * abs(row[column]) / math.sqrt(2.0)
+                 for column, name in enumerate(self._predictor.channels)
+                 if name.is_housing and abs(row[column]) > 0.0}, now)
+
+    def _counted(self, events: Iterable[Event]) -> Iterator[Event]:
+        """Count the points that are weighed for good, and hand everything on."""
+        for event in events:
+            if isinstance(event, Weighed):
+                self._band.count(event)
+            yield event
+
+    def _dated(self, pace: Pace, settled_ns: float) -> Iterator[Weighed]:
+        """Yield the points up to a stamp with their rate of speed and why they do not count."""
+        waiting, self._fresh = _joined(self._fresh), []
+        for compared in waiting:
+            known = compared.stamp_ns <= settled_ns
+            if not known.all():
+                self._fresh.append(_rows(compared, ~known))
+            if known.any():
+                dated = _rows(compared, known)
+                rate, lag = pace.at(dated.stamp_ns)
+                yield Weighed(dated, rate, self._reasons(dated, lag))
+
+    def _reasons(self, compared: Compared, lag: FloatArray) -> npt.NDArray[Any]:
+        """Return why points may not be held against the machine, (n, channels)."""
+        rules = self._judging.rules
+        lowest, highest = self._predictor.table.speed_range
+        speed = compared.speed[:, None]
+        floor = np.maximum(rules.matching.noise, ABOVE_NOISE * np.maximum(
+            compared.deviation, [self.runout.scatter(name) for name in compared.channels]))
+        reason = np.full(compared.amplitude.shape, Reason.USED, dtype=object)
+        for why, holds in (  # the last that holds is told
+                (Reason.NOT_QUASI_STATIC, ~(lag[:, None] <= rules.largest_lag)),
+                (Reason.BELOW_NOISE, compared.amplitude < floor),
+                (Reason.SLOW_ROLL, self.runout.is_rolling(speed)),
+                (Reason.NO_PREDICTION, ~np.isfinite(compared.predicted)),
+                (Reason.OUT_OF_TABLE, (speed < lowest) | (speed > highest)),
+                (Reason.NOT_FINITE, ~np.isfinite(compared.amplitude)),
+                (Reason.NO_SPEED, ~np.isfinite(speed))):
+            reason[np.broadcast_to(holds, reason.shape)] = why
+        return reason
 
     def _band_rows(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[int]:
         """Yield the rows with which a band is due."""
@@ -171,67 +237,43 @@ class Judge:
                 or abs(speed - told_speed) > MOVED * told_speed)
 
     def _matched(self, *, is_tick: bool = False) -> Iterator[Compared]:
-        """Yield what has found its speed."""
-        by_channels: dict[tuple[str, ...], list[Vectors]] = {}
+        """Yield what has found its speed and has a prediction."""
+        by_channels: dict[tuple[Channel, ...], list[Vectors]] = {}
         for vectors in self._pairing.ready(is_tick=is_tick):
             by_channels.setdefault(vectors.channels, []).append(vectors)
         for channels, found in by_channels.items():
             compared = self._compare(channels, found)
-            if compared is not None:
-                self._compared.append(compared)
-                yield compared
+            self._fresh.append(compared)
+            known = [column for column, name in enumerate(compared.channels)
+                     if name in self._predictor.channels]
+            told = np.isfinite(compared.speed)
+            if known and told.any():
+                matched = _columns(compared if told.all() else _rows(compared, told), known)
+                self._heard.append(matched)
+                yield matched
 
-    def _compare(self, channels: Sequence[str], found: Sequence[Vectors]) -> Compared | None:
-        """Return vectors of the same channels beside their prediction, if there is any."""
-        known = [column for column, name in enumerate(channels)
-                 if name in self._predictor.channels]
-        self._unknown |= set(channels).difference(self._predictor.channels)
-        if not known:
-            return None
-        columns = [self._predictor.channels.index(channels[column]) for column in known]
+    def _compare(self, channels: Sequence[Channel], found: Sequence[Vectors]) -> Compared:
+        """Return vectors of the same channels beside their prediction, NaN where there is none."""
+        names = tuple(channels)
+        self._unknown |= set(names).difference(self._predictor.channels)
         speed = np.array([vectors.speed for vectors in found])
-        halves = [vectors.displacement() for vectors in found]
-        amplitude = np.array([half[0][known] for half in halves])
-        phase = np.array([half[1][known] for half in halves])
-        names = tuple(self._predictor.channels[column] for column in columns)
-        amplitude, phase = self._runout.subtract(names, speed, amplitude, phase)
-        low = high = np.full(amplitude.shape, np.nan)
+        amplitude, phase = (np.array(part) for part in zip(
+            *(vectors.displacement() for vectors in found), strict=True))
+        amplitude, phase = self.runout.subtract(names, speed, amplitude, phase)
+        columns = [self._predictor.channels.index(name) if name in self._predictor.channels
+                   else -1 for name in names]
+        unknown = np.array(columns) < 0
+        predicted = answer(self._predictor, speed)[:, columns]
+        predicted[:, unknown] = complex(math.nan, math.nan)
+        bounds = [np.full(amplitude.shape, np.nan)] * 4
         if self._envelope is not None:
             band = self._envelope.at(speed)
-            low, high = band.low[:, columns], band.high[:, columns]
+            bounds = [np.where(unknown, np.nan, part[:, columns])
+                      for part in (band.low, band.high, band.behind, band.ahead)]
         return Compared(
             self.machine, np.array([vectors.stamp_ns for vectors in found]), speed, names,
-            amplitude, phase, np.array([vectors.deviation for vectors in found])[:, known],
-            answer(self._predictor, speed)[:, columns], low, high)
-
-    def _weigh(self, criteria: Criteria, compared: Iterable[Compared]) -> None:
-        """Zone what was measured and predicted, and count what is inside the band."""
-        natural = {axis: criteria.lowest_natural_speed(axis) for axis in ACROSS}
-        for each in compared:
-            self._vibration.measure(each, natural)
-            self._vibration.compare(each, self._counting(each, criteria))
-            self._passing.take(each)
-        speed = self.history.last_speed
-        if math.isfinite(speed):
-            row = answer(self._predictor, np.array([speed]))[0]
-            self._vibration.predict(
-                {channel: speed * abs(row[column]) / math.sqrt(2.0)
-                 for column, channel in enumerate(self._predictor.channels)
-                 if channel.is_housing and abs(row[column]) > 0.0}, speed, natural)
-
-    def _counting(self, compared: Compared, criteria: Criteria) -> BoolArray:
-        """Return which points may be held against the machine, (n, channels)."""
-        stamps, speed, _ = self.history.track()
-        first = int(np.searchsorted(stamps, compared.stamp_ns.min()))
-        recent = slice(max(0, first - SLOPE_SAMPLES), None)
-        stamps, speed = stamps[recent], speed[recent]
-        slow = is_quasi_static((stamps - stamps[:1]) / NANOSECONDS, speed, criteria.resonances)
-        index = nearest(compared.stamp_ns, stamps, tolerance=math.inf)
-        counts = slow[index] if len(slow) else np.zeros(len(index), dtype=bool)
-        counts = counts & ~self._runout.is_rolling(compared.speed)
-        floor = np.maximum(self._judging.rules.matching.noise, ABOVE_NOISE * compared.deviation)
-        return np.asarray(counts[:, None] & np.isfinite(compared.predicted)
-                          & (compared.amplitude >= floor))
+            amplitude, phase, np.array([vectors.deviation for vectors in found]), predicted,
+            *bounds)
 
     def _strangers(self, now_ns: int) -> Iterator[Remark]:
         """Tell once which measured channels no prediction has: a slip in a name, mostly."""
@@ -244,18 +286,42 @@ class Judge:
                          + ', '.join(name + (f' (did you mean {like[0]}?)' if like else '')
                                      for name, like in zip(new, near, strict=True)))
 
+    @property
+    def told_twice(self) -> set[Channel]:
+        """Channels of which both vectors and raw samples came; the vectors count."""
+        return self._paired & set(self._demodulators)
+
     def _counts(self) -> dict[str, float]:
         return {'without_speed': self._pairing.given_up,
                 'samples_left_out': sum(each.left_out for each in self._demodulators.values()),
                 'raw_channels': len(self._demodulators)}
 
 
+_ARRAYS = tuple(entry.name for entry in fields(Compared)
+                if entry.name not in ('machine', 'channels'))
+
+
+def _rows(compared: Compared, which: npt.NDArray[Any]) -> Compared:
+    """Return some of the points."""
+    return Compared(machine=compared.machine, channels=compared.channels, **{
+        name: getattr(compared, name)[which] for name in _ARRAYS})
+
+
+def _columns(compared: Compared, which: Sequence[int]) -> Compared:
+    """Return some of the channels."""
+    if len(which) == len(compared.channels):
+        return compared
+    return Compared(
+        machine=compared.machine, channels=tuple(compared.channels[column] for column in which),
+        **{name: part[:, which] if (part := getattr(compared, name)).ndim > 1 else part
+           for name in _ARRAYS})
+
+
 def _joined(found: Sequence[Compared]) -> list[Compared]:
-    """Return what was compared since the last tick, once for each set of channels."""
+    """Return what was compared, once for each set of channels."""
     by_channels: dict[tuple[Channel, ...], list[Compared]] = {}
     for each in found:
         by_channels.setdefault(each.channels, []).append(each)
-    arrays = {entry.name for entry in fields(Compared)} - {'machine', 'channels'}
     return [Compared(machine=parts[0].machine, channels=channels, **{
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays})
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS})
         for channels, parts in by_channels.items()]

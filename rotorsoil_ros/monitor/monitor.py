@@ -21,7 +21,8 @@ from rotorsoil_ros.events import (
 )
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.monitor.health import Health
-from rotorsoil_ros.monitor.judge import Judge, Judging
+from rotorsoil_ros.monitor.judge import Judge
+from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.prediction import Prediction
 
 NO_ANSWER = complex(np.nan, np.nan)
@@ -38,6 +39,7 @@ class Monitor:
     def __init__(
         self, machine: str, table: ResponseTable, unbalance: ComplexArray, *,
         sinks: Sequence[Sink], judging: Judging | None = None,
+        hindsight: Mapping[str, complex] | None = None,
     ) -> None:
         self.machine = machine
         self.table = table
@@ -45,7 +47,7 @@ class Monitor:
         self.health.standing = '; '.join(unstable(table.stability))
         self._sinks = tuple(sinks)
         self._predictor = table.predictor(unbalance)
-        self.judge = Judge(machine, self._predictor, judging or Judging())
+        self.judge = Judge(machine, self._predictor, judging or Judging(), hindsight=hindsight)
 
     def set_unbalance(self, unbalance: ComplexArray) -> None:
         """Use another unbalance, (planes,) [kg m], from the next speed on."""

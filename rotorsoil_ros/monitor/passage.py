@@ -1,30 +1,29 @@
 """Where a run passed a resonance, and whether that was where and as high as predicted."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
+from numpy.lib.stride_tricks import sliding_window_view
 
-from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.arrays import BoolArray, FloatArray, prominent_peaks
 from rotorsoil_ros.monitor.quasistatic import (
-    DECAY,
     LARGEST_SHIFT,
     passage_number,
     Resonance,
     SLOW_ENOUGH,
-    speed_rate,
 )
+from rotorsoil_ros.units import rad_s_to_rpm
 
 # A peak rises by this factor over the valleys beside it ...
-_PROMINENCE = 1.5
+PROMINENCE = 1.5
 # ... and to this share of the largest amplitude of its sweep.
 _NEGLIGIBLE = 0.1
 
-# A sweep spans this share of its highest speed, and ends where the speed turns back by it.
-_SPAN = 0.1
+# At this many decay times of a passage its free vibration is down to a twentieth of the forced
+# one: exp(-p tau) against 1 / tau.
+_DECAY = 5.0
 
 # Samples over which a median is taken, and from how many samples on.
 _MEDIANS = ((40, 5), (20, 3))
@@ -77,32 +76,37 @@ class Passage:
         return min(ends), max(ends)
 
 
-def passages(time: FloatArray, speed: FloatArray, amplitude: FloatArray) -> list[Passage]:
+def passages(
+    speed: FloatArray, amplitude: FloatArray, rate: FloatArray, *, sweep: int = 0,
+) -> list[Passage]:
     """
-    Find the peaks of every run-up and run-down.
+    Find the peaks of one run-up or run-down.
 
     Parameters
     ----------
-    time, speed, amplitude : (n,) float arrays
-        Ascending [s], [rad/s] and [m, rad]; samples that are not finite are left out.
+    speed, amplitude, rate : (n,) float arrays
+        In the order of time [rad/s], [m, rad], [rad/s^2]; samples whose speed or amplitude is
+        not finite are left out.
+    sweep : int
+        Number of the run-up or run-down.
 
     """
     given = np.isfinite(speed) & np.isfinite(amplitude)
-    time, speed, amplitude = time[given], speed[given], amplitude[given]
-    found = []
-    rate = speed_rate(time, speed)
-    for number, sweep in enumerate(sweeps(speed)):
-        smooth = amplitude[sweep]
-        for samples, width in _MEDIANS:
-            if len(smooth) >= samples:
-                smooth = median_filter(smooth, width, mode='nearest')
-                break
-        level = np.log(np.maximum(smooth, _NEGLIGIBLE * smooth.max(initial=0.0))
-                       + np.finfo(float).tiny)
-        peaks, _ = find_peaks(level, prominence=math.log(_PROMINENCE))
-        found += [Passage(float(speed[sweep][peak]), float(smooth[peak]),
-                          float(rate[sweep][peak]), number) for peak in peaks]
-    return found
+    speed, smooth, rate = speed[given], amplitude[given], rate[given]
+    for samples, width in _MEDIANS:
+        if len(smooth) >= samples:
+            smooth = _running_median(smooth, width)
+            break
+    level = np.log(np.maximum(smooth, _NEGLIGIBLE * smooth.max(initial=0.0))
+                   + np.finfo(float).tiny)
+    return [Passage(float(speed[peak]), float(smooth[peak]), float(rate[peak]), sweep)
+            for peak in prominent_peaks(level, math.log(PROMINENCE))]
+
+
+def _running_median(values: FloatArray, width: int) -> FloatArray:
+    """Return the median of each value and its neighbours; the first and last ones repeat."""
+    padded = np.pad(values, width // 2, mode='edge')
+    return np.asarray(np.median(sliding_window_view(padded, width), axis=1))
 
 
 def without_ringing(
@@ -141,7 +145,7 @@ def ringing_reach(damping_ratio: float, passage: Passage) -> float:
     number = passage.number(damping_ratio)
     if not number < SLOW_ENOUGH:
         return 0.0
-    return DECAY / max(number, np.finfo(float).tiny) * math.sqrt(abs(passage.rate))
+    return _DECAY / max(number, np.finfo(float).tiny) * math.sqrt(abs(passage.rate))
 
 
 def damping_beside(speed: float, resonances: Sequence[Resonance]) -> float:
@@ -150,25 +154,23 @@ def damping_beside(speed: float, resonances: Sequence[Resonance]) -> float:
                default=Resonance(0.0, math.nan)).damping_ratio
 
 
-def sweeps(speed: FloatArray) -> list[slice]:
-    """Return the stretches in which the speed, (n,) [rad/s], only rises or only falls."""
-    if not len(speed):
-        return []
-    turn_back = _SPAN * float(speed.max())
-    turns, extreme, rising = [0], 0, 0
-    for index, value in enumerate(speed.tolist()):
-        ahead = (value - float(speed[extreme])) * rising
-        if rising == 0 and abs(value - float(speed[0])) > turn_back:
-            rising, extreme = (1 if value > speed[0] else -1), index
-        elif ahead > 0.0:
-            extreme = index
-        elif ahead < -turn_back:
-            turns.append(extreme)
-            rising, extreme = -rising, index
-    if rising == 0:
-        return []
-    return [slice(start, stop + 1) for start, stop in zip(
-        turns, [*turns[1:], len(speed) - 1], strict=True)]
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """
+    What a predicted peak allows a channel, and what the channel did there.
+
+    Attributes
+    ----------
+    least, most : float
+        Between which the measured peak has to be [m, rad].
+    shown : float
+        Largest amplitude that was measured where the peak may be [m, rad].
+
+    """
+
+    least: float = math.nan
+    most: float = math.nan
+    shown: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +186,8 @@ class PeakPair:
         The peaks.
     damping_ratio : float
         Of the critical speed next to them [-]; NaN where none is known.
-    limit : float
-        Amplitude that the measured peak must not exceed [m, rad].
+    allowed : Allowed
+        By the prediction; NaN where there is none.
 
     """
 
@@ -193,7 +195,7 @@ class PeakPair:
     predicted: Passage | None
     measured: Passage | None
     damping_ratio: float
-    limit: float
+    allowed: Allowed = field(default_factory=Allowed)
 
     @property
     def deviation(self) -> float:
@@ -205,6 +207,11 @@ class PeakPair:
         return float(np.clip(self.predicted.speed, low, high)) / self.predicted.speed - 1.0
 
     @property
+    def is_complete(self) -> bool:
+        """Whether both sides have the peak."""
+        return self.predicted is not None and self.measured is not None
+
+    @property
     def is_slow(self) -> bool:
         """Whether the peak was passed slowly enough to be as high as at constant speed."""
         passed = self.measured or self.predicted
@@ -213,7 +220,7 @@ class PeakPair:
 
 def pair(
     channel: str, predicted: Sequence[Passage], measured: Sequence[Passage], *,
-    limits: Sequence[float], resonances: Sequence[Resonance],
+    allowed: Sequence[Allowed], resonances: Sequence[Resonance],
 ) -> list[PeakPair]:
     """
     Pair predicted and measured peaks, the closest first.
@@ -224,8 +231,8 @@ def pair(
         Where they are.
     predicted, measured : sequences of Passage
         Peaks of the same run.
-    limits : sequence of float
-        What each predicted peak allows [m, rad].
+    allowed : sequence of Allowed
+        What each predicted peak allows.
     resonances : sequence of Resonance
         Critical speeds of the machine.
 
@@ -242,10 +249,10 @@ def pair(
             left.remove(i)
             right.remove(j)
             pairs.append(PeakPair(channel, predicted[i], measured[j],
-                                  damping_ratio(predicted[i]), limits[i]))
-    pairs += [PeakPair(channel, predicted[i], None, damping_ratio(predicted[i]), limits[i])
+                                  damping_ratio(predicted[i]), allowed[i]))
+    pairs += [PeakPair(channel, predicted[i], None, damping_ratio(predicted[i]), allowed[i])
               for i in sorted(left)]
-    pairs += [PeakPair(channel, None, measured[j], damping_ratio(measured[j]), math.nan)
+    pairs += [PeakPair(channel, None, measured[j], damping_ratio(measured[j]))
               for j in sorted(right)]
     return pairs
 
@@ -265,3 +272,39 @@ def told_once(pairs: Sequence[PeakPair]) -> list[PeakPair]:
         return False
 
     return [each for each in pairs if not is_told(each)]
+
+
+def is_where(speed: FloatArray, peak: Passage) -> BoolArray:
+    """Return which speeds [rad/s] are so near to a peak that its partner may be there."""
+    return np.asarray(np.abs(speed / peak.speed - 1.0) <= _FARTHEST)
+
+
+def is_decided(peak: PeakPair, speed: float, *, is_rising: bool) -> bool:
+    """Return whether a peak without a partner cannot find one beyond a speed [rad/s] any more."""
+    if peak.predicted is not None:
+        last = peak.predicted.speed * (1.0 + _FARTHEST if is_rising else 1.0 - _FARTHEST)
+    else:
+        assert peak.measured is not None
+        last = peak.measured.speed / (1.0 - _FARTHEST if is_rising else 1.0 + _FARTHEST)
+    return speed > last if is_rising else speed < last
+
+
+def peak_fault(peak: PeakPair, *, margin: float) -> str:
+    """Return what is wrong with a peak; nothing if all is well or nothing can be said."""
+    if peak.measured is None:
+        assert peak.predicted is not None
+        # One that does not stand out, as from an unbalance that grows, is there all the same.
+        is_missing = peak.is_slow and not peak.allowed.shown >= peak.allowed.least
+        return '' if not is_missing else (
+            f'{peak.channel}: the peak predicted at {rad_s_to_rpm(peak.predicted.speed):.0f} rpm '
+            'was not measured')
+    at = f'{peak.channel}: the peak measured at {rad_s_to_rpm(peak.measured.speed):.0f} rpm'
+    if peak.predicted is None:
+        return f'{at} is not predicted'
+    if abs(peak.deviation) > margin:
+        return (f'{at} is {100 * peak.deviation:+.1f} % from the predicted '
+                f'{rad_s_to_rpm(peak.predicted.speed):.0f} rpm, allowed {100 * margin:.0f} %')
+    if peak.measured.amplitude > peak.allowed.most:
+        return (f'{at} is {1e6 * peak.measured.amplitude:.3g} um high, at most '
+                f'{1e6 * peak.allowed.most:.3g} um predicted')
+    return ''

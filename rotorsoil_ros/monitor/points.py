@@ -1,134 +1,20 @@
-"""Does a machine move as predicted? Measured and predicted vectors, point by point."""
+"""Measured and predicted vectors of one channel, point by point, and how far they lie apart."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 import math
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.channel import Channel, named
-from rotorsoil_ros.errors import require
-from rotorsoil_ros.monitor.quasistatic import is_quasi_static, Resonance
+from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.events import Event, Predicted, Reason, Weighed
+from rotorsoil_ros.monitor.inside import is_inside
 
-NANOSECOND = 1e-9
-
-# A slow-roll vector is the mean of what was measured within this share of its speed.
-SLOW_ROLL_WINDOW = 0.05
-
-# Multiples of its standard error below which a vector is noise.
-ABOVE_NOISE = 3.0
-
-_Reasons: TypeAlias = npt.NDArray[Any]
-
-
-class Reason(StrEnum):
-    """Why a measured point is not held against its prediction."""
-
-    USED = ''
-    NOT_FINITE = 'measured value is negative or not finite'
-    NO_SPEED = 'no speed reported near its stamp'
-    OUT_OF_TABLE = 'outside the speed range of the prediction'
-    NO_PREDICTION = 'channel or speed has no prediction'
-    SLOW_ROLL = 'slow roll, taken as runout'
-    BELOW_NOISE = 'below noise'
-    NOT_QUASI_STATIC = 'not quasi-static'
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Signal:
-    """
-    Once-per-turn vectors that one channel measured.
-
-    Attributes
-    ----------
-    stamp_ns : (n,) int array
-        When [ns].
-    amplitude : (n,) float array
-        Displacement, zero-to-peak [m, rad].
-    phase : (n,) float array
-        [rad]; NaN where nothing told the angle of the rotor.
-    deviation : (n,) float array
-        Standard error of the amplitude [m, rad], 0 where it is not known.
-
-    """
-
-    stamp_ns: IntArray
-    amplitude: FloatArray
-    phase: FloatArray
-    deviation: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reference:
-    """
-    What was predicted over a run, in the order of its time.
-
-    Attributes
-    ----------
-    stamp_ns : (m,) int array
-        Of the reported speeds, ascending [ns].
-    speed : (m,) float array
-        [rad/s].
-    channels : tuple of Channel
-        What was predicted.
-    displacement : (m, c) complex array
-        NaN where there is no prediction [m, rad].
-    low, high : (m, c) float array
-        Amplitudes between which it lies as far as the soil is known, NaN where no band is.
-    behind, ahead : (m, c) float array
-        By how much its phase lies behind or ahead at most [rad], likewise.
-    speed_range : tuple of two floats
-        That the prediction covers [rad/s].
-
-    """
-
-    stamp_ns: IntArray
-    speed: FloatArray
-    channels: tuple[Channel, ...]
-    displacement: ComplexArray
-    low: FloatArray
-    high: FloatArray
-    behind: FloatArray
-    ahead: FloatArray
-    speed_range: tuple[float, float]
-
-    @property
-    def time(self) -> FloatArray:
-        """Time since the first speed, (m,) [s]."""
-        return np.asarray((self.stamp_ns - self.stamp_ns[:1]) * NANOSECOND)
-
-
-@dataclass(frozen=True, slots=True)
-class Matching:
-    """
-    How points are matched and cleaned.
-
-    Attributes
-    ----------
-    tolerance : float
-        Largest distance between the stamps of a measurement and of a speed [s].
-    slow_roll_speed : float
-        Speed whose mean vector is runout and is subtracted from the channel [rad/s]; NaN: none.
-    noise : float
-        Amplitude below which nothing is compared [m, rad].
-
-    """
-
-    tolerance: float = 0.05
-    slow_roll_speed: float = math.nan
-    noise: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(0.0 <= self.tolerance < math.inf, 'tolerance', '>= 0 s and finite',
-                self.tolerance)
-        require(not self.slow_roll_speed <= 0.0, 'slow_roll_speed', '> 0 rad/s',
-                self.slow_roll_speed)
-        require(0.0 <= self.noise < math.inf, 'noise', '>= 0 m and finite', self.noise)
+_PER_CHANNEL = ('amplitude', 'phase', 'predicted', 'low', 'high', 'behind', 'ahead')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,10 +24,11 @@ class ChannelPoints:
 
     Attributes
     ----------
-    channel : str
+    channel : Channel
         Its name.
     stamp_ns, speed : (n,) arrays
-        Of the measurement [ns]; reported nearest to it, NaN where none is near [rad/s].
+        Of the measurement, ascending [ns]; reported nearest to it, NaN where none is near
+        [rad/s].
     amplitude : (n,) float array
         Measured, less runout where it is known [m, rad].
     phase : (n,) float array
@@ -154,8 +41,6 @@ class ChannelPoints:
         The band of its phase about that of the prediction [rad], likewise.
     reason : (n,) array of Reason
         Why a point is not used; USED where it is.
-    runout : complex
-        What was subtracted [m, rad]; NaN where no slow-roll vector is known.
 
     """
 
@@ -169,8 +54,7 @@ class ChannelPoints:
     high: FloatArray
     behind: FloatArray
     ahead: FloatArray
-    reason: _Reasons
-    runout: complex
+    reason: npt.NDArray[Any]
 
     @property
     def used(self) -> BoolArray:
@@ -194,82 +78,43 @@ class ChannelPoints:
         return dict(Counter(str(reason) for reason in self.reason if reason != Reason.USED))
 
 
-def match(
-    signals: Mapping[str, Signal], reference: Reference, resonances: Sequence[Resonance],
-    matching: Matching,
-) -> list[ChannelPoints]:
-    """
-    Hold measured vectors against the predictions nearest in time.
+class Collector:
+    """A sink that keeps the speeds of a run and every point that was weighed."""
 
-    Parameters
-    ----------
-    signals : mapping of str to Signal
-        What was measured, by channel.
-    reference : Reference
-        What was predicted.
-    resonances : sequence of Resonance
-        While one of them is passed too fast, points are not used.
-    matching : Matching
-        Tolerances.
+    def __init__(self) -> None:
+        self._speeds: list[tuple[IntArray, FloatArray]] = []
+        self._columns: dict[Channel, list[tuple[npt.NDArray[Any], ...]]] = defaultdict(list)
 
-    """
-    slow = is_quasi_static(reference.time, reference.speed, resonances)
-    return [_channel(name, signal, reference, slow, matching)
-            for name, signal in signals.items()]
+    def __call__(self, event: Event) -> None:
+        """Keep what is told of speeds and points."""
+        match event:
+            case Predicted():
+                self._speeds.append((event.stamp_ns, event.prediction.speed))
+            case Weighed(compared=compared):
+                for column, channel in enumerate(compared.channels):
+                    self._columns[channel].append((
+                        compared.stamp_ns, compared.speed,
+                        *(getattr(compared, name)[:, column] for name in _PER_CHANNEL),
+                        event.reason[:, column]))
 
+    def speeds(self) -> tuple[IntArray, FloatArray]:
+        """Return stamps, ascending [ns], and finite speeds [rad/s] of the run."""
+        if not self._speeds:
+            return np.array([], dtype=np.int64), np.array([])
+        stamps, speed = (np.concatenate(part) for part in zip(*self._speeds, strict=True))
+        given = np.isfinite(speed)
+        stamps, first = np.unique(stamps[given], return_index=True)
+        return stamps, speed[given][first]
 
-def nearest(wanted: IntArray, given: IntArray, *, tolerance: float) -> IntArray:
-    """Return the index of the nearest of given stamps [ns], -1 beyond a tolerance [s]."""
-    if not len(given):
-        return np.full(len(wanted), -1)
-    after = np.clip(np.searchsorted(given, wanted), 0, len(given) - 1)
-    before = np.maximum(after - 1, 0)
-    index = np.where(wanted - given[before] <= given[after] - wanted, before, after)
-    index = np.where(wanted > given[-1], len(given) - 1, index)
-    return np.asarray(np.where(np.abs(given[index] - wanted) * NANOSECOND <= tolerance, index, -1))
+    def points(self) -> list[ChannelPoints]:
+        """Return the points of every channel."""
+        return [_sorted(channel, parts) for channel, parts in self._columns.items()]
 
 
-def _channel(
-    name: str, signal: Signal, reference: Reference, slow: BoolArray, matching: Matching,
-) -> ChannelPoints:
-    index = nearest(signal.stamp_ns, reference.stamp_ns, tolerance=matching.tolerance)
-
-    def matched(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return np.where(index >= 0, values[index], np.nan)
-
-    nothing = np.full(len(reference.stamp_ns), np.nan)
-    column = reference.channels.index(name) if name in reference.channels else -1
-    predicted, low, high, behind, ahead = (
-        matched(nothing if column < 0 else values[:, column])
-        for values in (reference.displacement, reference.low, reference.high, reference.behind,
-                       reference.ahead))
-    speed = matched(reference.speed)
-    amplitude, phase = signal.amplitude, signal.phase
-    amplitude = np.where((amplitude >= 0.0) & np.isfinite(amplitude), amplitude, np.nan)
-    rolling = (np.abs(speed - matching.slow_roll_speed)
-               <= SLOW_ROLL_WINDOW * matching.slow_roll_speed)
-    rolling &= np.isfinite(amplitude * phase)
-    runout, floor = complex(np.nan, np.nan), matching.noise
-    if rolling.any():
-        vectors = amplitude * np.exp(1j * phase)
-        runout = complex(vectors[rolling].mean())
-        floor = max(floor, ABOVE_NOISE * float(np.std(vectors[rolling])))
-        left = vectors - runout
-        amplitude = np.where(np.isfinite(phase), np.abs(left), amplitude)
-        phase = np.where(np.isfinite(phase), np.angle(left), phase)
-    lowest, highest = reference.speed_range
-    reason = np.full(len(index), Reason.USED, dtype=object)
-    for why, holds in (  # the last that holds is told
-            (Reason.NOT_QUASI_STATIC, (index >= 0) & ~slow[index]),
-            (Reason.BELOW_NOISE, amplitude < np.maximum(floor, ABOVE_NOISE * signal.deviation)),
-            (Reason.SLOW_ROLL, rolling),
-            (Reason.NO_PREDICTION, ~np.isfinite(predicted)),
-            (Reason.OUT_OF_TABLE, (speed < lowest) | (speed > highest)),
-            (Reason.NO_SPEED, ~np.isfinite(speed)),
-            (Reason.NOT_FINITE, ~np.isfinite(amplitude))):
-        reason[holds] = why
-    return ChannelPoints(named(name, reference.channels), signal.stamp_ns, speed, amplitude,
-                         phase, predicted, low, high, behind, ahead, reason, runout)
+def _sorted(channel: Channel, parts: list[tuple[npt.NDArray[Any], ...]]) -> ChannelPoints:
+    columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
+    order = np.argsort(columns[0], kind='stable')
+    return ChannelPoints(channel, *(column[order] for column in columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,8 +151,22 @@ class Statistics:
     phase_inside: float
 
 
-def statistics(points: ChannelPoints, *, margin: float) -> Statistics:
-    """Return how the used points of a channel lie; the band is widened by a share `margin`."""
+def statistics(
+    points: ChannelPoints, *, margin: float, inside: Mapping[Channel, float],
+) -> Statistics:
+    """
+    Return how the used points of a channel lie.
+
+    Parameters
+    ----------
+    points : ChannelPoints
+        The channel.
+    margin : float
+        Share by which the band is widened.
+    inside : mapping of Channel to float
+        By channel the share inside the band, as the judge has counted it.
+
+    """
     used = points.used
     size, expected = points.amplitude[used], np.abs(points.predicted[used])
     if not len(size):
@@ -315,14 +174,6 @@ def statistics(points: ChannelPoints, *, margin: float) -> Statistics:
     turn = np.exp(1j * (points.phase[used] - np.angle(points.predicted[used])))
     turn = turn[np.isfinite(turn)]
     mean_turn = turn.mean() if len(turn) else complex(np.nan, np.nan)
-    measured, predicted = points.measured[used], points.predicted[used]
-    if not np.isfinite(measured).all():
-        measured, predicted = size.astype(complex), expected.astype(complex)
-    spread = float(np.sum(np.abs(measured - measured.mean()) ** 2))
-    left = float(np.sum(np.abs(measured - predicted) ** 2))
-    low, high = points.low[used], points.high[used]
-    banded = np.isfinite(low)
-    inside = (size >= (1.0 - margin) * low) & (size <= (1.0 + margin) * high)
     moving = expected > 0.0
     return Statistics(
         bias=float(np.mean(size - expected)), scatter=float(np.std(size - expected)),
@@ -330,9 +181,19 @@ def statistics(points: ChannelPoints, *, margin: float) -> Statistics:
         phase_bias=float(np.angle(mean_turn)) if len(turn) else math.nan,
         phase_scatter=(float(np.std(np.angle(turn * mean_turn.conjugate()))) if len(turn)
                        else math.nan),
-        r_squared=1.0 - left / spread if spread > 0.0 else math.nan,
-        inside=float(np.mean(inside[banded])) if banded.any() else math.nan,
+        r_squared=_r_squared(points), inside=inside.get(points.channel, math.nan),
         phase_inside=_phase_inside(points, margin))
+
+
+def _r_squared(points: ChannelPoints) -> float:
+    used = points.used
+    measured, predicted = points.measured[used], points.predicted[used]
+    if not np.isfinite(measured).all():
+        measured = points.amplitude[used].astype(complex)
+        predicted = np.abs(predicted).astype(complex)
+    spread = float(np.sum(np.abs(measured - measured.mean()) ** 2))
+    left = float(np.sum(np.abs(measured - predicted) ** 2))
+    return 1.0 - left / spread if spread > 0.0 else math.nan
 
 
 def _phase_inside(points: ChannelPoints, margin: float) -> float:
@@ -342,5 +203,5 @@ def _phase_inside(points: ChannelPoints, margin: float) -> float:
         return math.nan
     turn = np.angle(np.exp(1j * (points.phase - np.angle(points.predicted))))[told]
     slack = math.asin(min(margin, 1.0))
-    return float(np.mean((turn >= points.behind[told] - slack)
-                         & (turn <= points.ahead[told] + slack)))
+    return float(np.mean(is_inside(turn, points.behind[told] - slack,
+                                   points.ahead[told] + slack, margin=0.0)))

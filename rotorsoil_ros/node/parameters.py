@@ -22,8 +22,7 @@ from rclpy.parameter import Parameter
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.monitor.judge import Judging
-from rotorsoil_ros.monitor.points import Matching
+from rotorsoil_ros.monitor.rules import Judging, Matching
 from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.handlers import ROTOR_JOINT
 

@@ -14,7 +14,7 @@ from rotorsoil_ros.bags.retention import Recovery
 from rotorsoil_ros.bags.writer import new_directory
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import Diagnostics, Event, Model
+from rotorsoil_ros.events import Diagnostics, Event, Expected, Model
 from rotorsoil_ros.screen import open_viewer
 from rotorsoil_ros.wire.messages import Records
 
@@ -155,7 +155,7 @@ class Show:
     def __init__(self, begin: 'Callable[[Path | None], RerunSink]', first: Path | None) -> None:
         self._begin = begin
         self._sink = begin(first)
-        self._models: dict[str, Model] = {}
+        self._basis: dict[tuple[str, type], Model | Expected] = {}
 
     def take(self, batch: list[Event | Path]) -> None:
         """Show events; at a path go on in a new recording."""
@@ -163,11 +163,11 @@ class Show:
             if isinstance(item, Path):
                 self._sink.close()
                 self._sink = self._begin(item)
-                for model in self._models.values():  # on which what follows rests
-                    self._sink(model)
+                for basis in self._basis.values():  # on which what follows rests
+                    self._sink(basis)
                 continue
-            if isinstance(item, Model):
-                self._models[item.machine] = item
+            if isinstance(item, (Model, Expected)):
+                self._basis[item.machine, type(item)] = item
             self._sink(item)
         self._sink.flush()
 

@@ -10,9 +10,9 @@ import rerun.blueprint as rrb
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.events import Compared, NANOSECONDS
 from rotorsoil_ros.machine.band import Envelope
+from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.monitor.criteria import answer
-from rotorsoil_ros.monitor.peaks import resolved_speeds
 from rotorsoil_ros.screen.channels import MICRO, Trend
 from rotorsoil_ros.screen.chart import (
     Axis,

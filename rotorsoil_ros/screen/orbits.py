@@ -13,7 +13,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import across, HOUSING, JOURNAL
 from rotorsoil_ros.events import Compared, NANOSECONDS
-from rotorsoil_ros.monitor.points import nearest
+from rotorsoil_ros.monitor.vectors.history import nearest
 from rotorsoil_ros.screen.bode import MEASURED, PREDICTED
 from rotorsoil_ros.screen.channels import MICRO, moving_housings
 from rotorsoil_ros.screen.chart import drawn_grid, Label, round_up, TEXT, written
@@ -156,7 +156,7 @@ class Orbits:
                 self._measured(cell, x, z)
 
     def _measured(self, cell: Cell, x: 'Track', z: 'Track') -> None:
-        index = nearest(x.stamp_ns, z.stamp_ns, tolerance=TOGETHER_S)
+        index = nearest(x.stamp_ns, z.stamp_ns, tolerance_s=TOGETHER_S)
         rows = np.flatnonzero(index >= 0)
         rows = rows[self._recording.begins(
             f'{self._entity}/{cell.station}', x.stamp_ns[rows], FRAME_NS)]

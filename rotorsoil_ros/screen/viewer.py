@@ -16,6 +16,7 @@ from rotorsoil_ros.events import (
     Compared,
     Diagnostics,
     Event,
+    Expected,
     Level,
     Model,
     NANOSECONDS,
@@ -24,7 +25,7 @@ from rotorsoil_ros.events import (
     Samples,
     Zoned,
 )
-from rotorsoil_ros.monitor.criteria import Criteria, stored_criteria
+from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.screen.blueprint import blueprint, Shown
 from rotorsoil_ros.screen.bode import Bode
 from rotorsoil_ros.screen.channels import trends
@@ -136,9 +137,9 @@ class MachineView:
                     waterfall.take(event, self._speed)
             case Band():
                 self._bands.append(event)
-            case Zoned() | Remark() | Diagnostics() | Model():
+            case Zoned() | Remark() | Diagnostics() | Model() | Expected():
                 # Clocks differ: what is told without data stands at the data that it follows.
-                if self._last_ns is not None or isinstance(event, Model):
+                if self._last_ns is not None or isinstance(event, (Model, Expected)):
                     self._moments.append((event, self._last_ns or event.stamp_ns))
 
     @property
@@ -149,8 +150,9 @@ class MachineView:
         return abs(self._last_ns - int(self._predicted[0].stamp_ns[0]))
 
     def flush(self) -> None:
-        """Send what was collected."""
-        self._look_for_criteria()
+        """Send what was collected; first on what it rests."""
+        while self._moments:
+            self._send_moment(*self._moments.popleft())
         self._orbits.expect(self._compared)
         if self._predicted:
             self._send_predicted(self._predicted)
@@ -162,8 +164,6 @@ class MachineView:
         if self._bands:
             self._trends.band(self._bands)
         self._predicted, self._compared, self._bands = [], [], []
-        while self._moments:
-            self._send_moment(*self._moments.popleft())
 
     def _send_predicted(self, events: list[Predicted]) -> None:
         stamps = np.concatenate([event.stamp_ns for event in events])
@@ -190,6 +190,9 @@ class MachineView:
                 self._write(event.level, event.summary, stamp_ns)
             case Model():
                 self._take_model(event)
+            case Expected():
+                self._criteria = Criteria.from_arrays(event.criteria)
+                self._bode.band(self._criteria.envelope)
 
     def _write(self, level: Level, text: str, stamp_ns: int) -> None:
         self._recording.send(self._shown.entity('events'), np.array([stamp_ns]),
@@ -213,16 +216,6 @@ class MachineView:
             self._bode.predict(None if unbalance is None else table.predictor(unbalance))
             self._bode.band(None)
 
-    def _look_for_criteria(self) -> None:
-        """Read band and supports once somebody has computed them; then there are zones."""
-        if self._criteria is None and self._unbalance is not None and any(
-                isinstance(event, Zoned) and event.predicted for event, _ in self._moments):
-            self._criteria = stored_criteria(
-                self._machine.case, self._machine.model, self._unbalance,
-                self._machine.directory)
-            if self._criteria is not None:
-                self._bode.band(self._criteria.envelope)
-
 
 def _clock(stamp_ns: int) -> str:
     """Return the time of day (UTC): the viewer's own column is too narrow for it."""
@@ -239,4 +232,4 @@ def _joined(events: Iterable[Compared]) -> Iterable[Compared]:
             return np.concatenate([getattr(event, name) for event in found])
         yield Compared(found[0].machine, all_of('stamp_ns'), all_of('speed'), channels, *(
             all_of(name) for name in ('amplitude', 'phase', 'deviation', 'predicted', 'low',
-                                      'high')))
+                                      'high', 'behind', 'ahead')))

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.monitor.orders import LARGEST_ACCELERATION
+from rotorsoil_ros.monitor.vectors.orders import LARGEST_ACCELERATION
 from rotorsoil_ros.wire.definitions import (
     Compound,
     compound,

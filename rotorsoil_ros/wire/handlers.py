@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
-from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.channel import Channel, named
 from rotorsoil_ros.events import LAST_STAMP, Measured, Samples
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.wire.cdr import AXES, BODY, ImuReader, JointStateReader, Layout, LITTLE_ENDIAN
@@ -162,6 +162,16 @@ class MeasuredInlet:
         self._monitor = monitor
         self._log = log
         self._reader = JointStateReader()
+        self._named: tuple[object, ...] = ()
+        self._channels: tuple[Channel, ...] = ()
+
+    def _known(self, names: tuple[str, ...]) -> tuple[Channel, ...]:
+        """Return the channels of names; a sensor repeats them with every message."""
+        table = self._monitor.table
+        if self._named != (names, table.key):
+            self._named = names, table.key
+            self._channels = tuple(named(name, table.channels) for name in names)
+        return self._channels
 
     def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
         """Take in messages; their own stamps count, not when they were received."""
@@ -171,7 +181,8 @@ class MeasuredInlet:
                 continue
             self._log(Records(self._topic, JOINT_STATE, states.stamp_ns.tolist(), messages))
             self._monitor.on_measured(Measured(
-                self._monitor.machine, self._quantity, states.stamp_ns, states.names,
+                self._monitor.machine, self._quantity, states.stamp_ns,
+                self._known(states.names),
                 states.position, states.velocity))
 
 
@@ -194,7 +205,7 @@ class SampleInlet:
             self._log(Records(self._topic, IMU, samples.stamp_ns.tolist(), messages))
             self._monitor.on_samples(Samples(
                 self._monitor.machine, self._channel, samples.stamp_ns,
-                samples.acceleration[:, self._axis]))
+                samples.acceleration[:, self._axis], samples.is_synthetic))
 
 
 def are_stamps(stamp_ns: IntArray) -> bool:

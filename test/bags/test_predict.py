@@ -150,7 +150,8 @@ def test_a_profile_without_speed_is_refused_by_name(tmp_path, machine):
     with LogFile(tmp_path / 'profile.mcap') as log:
         log.write(Records('/fan/measured/phase', JOINT_STATE, [START], JointStateWriter(
             ['a']).write([START], np.zeros((1, 3, 1)))))
-    with pytest.raises(InputError, match=r'profile\.mcap: needs one machine.*speed topics: none'):
+    with pytest.raises(
+            InputError, match=r'profile\.mcap: must tell the speed of.*speed topics: none'):
         predict(machine, tmp_path / 'profile.mcap', tmp_path / 'out.mcap')
 
 

@@ -8,7 +8,7 @@ import pytest
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.machine.time_domain import shake, unbalance_force
-from rotorsoil_ros.monitor.orders import demodulate, SpeedTrack
+from rotorsoil_ros.monitor.vectors.orders import demodulate, SpeedTrack
 
 from machines import CONTACT, paper_machine, Restrained, SOIL
 

@@ -23,7 +23,7 @@ def test_criteria_are_those_of_the_expectation(tmp_path):
     case, model = loaded(FAN, FEW)
     found = criteria(case, model, 2.0 * case.unbalance, tmp_path)
     expectation = Expectation.of(case, tmp_path)
-    band = expectation.envelope(2.0 * case.unbalance)
+    band = expectation.band.envelope(2.0 * case.unbalance)
     np.testing.assert_array_equal(found.envelope.high, band.high)
     assert list(found.resonances) == expectation.resonances
     assert found.lowest_natural_speed('z') == expectation.lowest_natural_speed('z')

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.monitor.passage import (
+    Allowed,
     pair,
     Passage,
     passages,
-    sweeps,
+    peak_fault,
+    PeakPair,
     told_once,
     without_ringing,
 )
@@ -23,32 +25,25 @@ def amplitude(speed, *, natural=150.0, zeta=0.05):
     return speed**2 / np.abs(natural**2 - speed**2 + 2j * zeta * natural * speed)
 
 
-def test_run_up_and_run_down_are_two_sweeps():
-    first, second = sweeps(UP_AND_DOWN)
-    assert first.start == 0
-    assert 40.0 < TIME[second.start] < 60.0
-    assert second.stop == len(TIME)
+def rate_of(speed):
+    return np.gradient(speed, TIME)
 
 
-def test_speed_that_only_trembles_is_no_sweep():
-    assert sweeps(100.0 + np.random.default_rng(0).normal(size=500)) == []
-    assert sweeps(np.array([])) == []
-
-
-def test_peak_is_found_in_every_sweep_despite_noise():
+def test_peak_is_found_despite_noise():
     noise = 1.0 + 0.05 * np.random.default_rng(1).normal(size=len(TIME))
-    found = passages(TIME, UP_AND_DOWN, amplitude(UP_AND_DOWN) * noise)
-    assert [passage.sweep for passage in found] == [0, 1]
-    for passage, rate in zip(found, (200.0 / 45.0, -200.0 / 45.0), strict=True):
-        assert passage.speed == pytest.approx(150.0, rel=0.03)  # five samples of a round top
-        assert passage.amplitude == pytest.approx(10.0, rel=0.08)
-        assert passage.rate == pytest.approx(rate, rel=0.01)
+    size = amplitude(UP_AND_DOWN) * noise
+    for sweep, rows in enumerate((slice(0, 500), slice(500, None))):
+        [found] = passages(UP_AND_DOWN[rows], size[rows], rate_of(UP_AND_DOWN)[rows], sweep=sweep)
+        assert found.sweep == sweep
+        assert found.speed == pytest.approx(150.0, rel=0.03)  # five samples of a round top
+        assert found.amplitude == pytest.approx(10.0, rel=0.08)
+        assert found.rate == pytest.approx((1 - 2 * sweep) * 200.0 / 45.0, rel=0.01)
 
 
 def test_missing_samples_do_not_matter():
     size = amplitude(UP_AND_DOWN)
     size[::3] = np.nan
-    assert len(passages(TIME, UP_AND_DOWN, size)) == 2
+    assert len(passages(UP_AND_DOWN[:500], size[:500], rate_of(UP_AND_DOWN)[:500])) == 1
 
 
 def test_critical_speed_is_before_a_peak_passed_too_fast():
@@ -70,35 +65,43 @@ def test_lobes_after_a_fast_passage_are_its_ringing():
 def test_peaks_are_paired_with_the_closest_and_told_apart():
     predicted = [Passage(100.0, 5.0, 1.0), Passage(200.0, 8.0, 1.0), Passage(198.0, 8.0, -1.0)]
     measured = [Passage(210.0, 9.0, 1.0), Passage(400.0, 1.0, 1.0)]
-    found = pair('a_x', predicted, measured, limits=[6.0, 9.0, 9.5],
+    found = pair('a_x', predicted, measured,
+                 allowed=[Allowed(most=limit) for limit in (6.0, 9.0, 9.5)],
                  resonances=[Resonance(95.0, 0.1), Resonance(205.0, 0.2)])
     assert [(each.predicted, each.measured) for each in found] == [
         (predicted[1], measured[0]), (predicted[0], None), (predicted[2], None),
         (None, measured[1])]
     assert found[0].deviation == pytest.approx(0.05)
-    assert found[0].limit == 9.0
+    assert found[0].allowed.most == 9.0
     assert found[0].damping_ratio == 0.2
     assert found[0].is_slow
     assert math.isnan(found[1].deviation)
 
 
 def test_run_up_is_not_held_against_a_run_down():
-    found = pair('a_x', [Passage(100.0, 5.0, -1.0)], [Passage(100.0, 5.0, 1.0)], limits=[6.0],
-                 resonances=[])
+    found = pair('a_x', [Passage(100.0, 5.0, -1.0)], [Passage(100.0, 5.0, 1.0)],
+                   allowed=[Allowed(most=6.0)], resonances=[])
     assert [(each.predicted is None, each.measured is None) for each in found] == [
         (False, True), (True, False)]
 
 
 def test_deviation_is_zero_where_the_fast_passage_explains_it():
-    [found] = pair('a_x', [Passage(152.0, 5.0, 25.0)], [Passage(160.0, 3.0, 25.0)], limits=[5.0],
-                   resonances=[Resonance(152.0, 0.001)])
+    [found] = pair('a_x', [Passage(152.0, 5.0, 25.0)], [Passage(160.0, 3.0, 25.0)],
+                   allowed=[Allowed(most=5.0)], resonances=[Resonance(152.0, 0.001)])
     assert found.deviation == 0.0
     assert not found.is_slow
 
 
 def test_peak_that_another_channel_pairs_is_told_once():
-    paired = pair('a_x', [Passage(100.0, 5.0, 1.0)], [Passage(90.0, 5.0, 1.0)], limits=[6.0],
-                  resonances=[])
-    alone = pair('a_z', [], [Passage(91.0, 5.0, 1.0), Passage(300.0, 5.0, 1.0)], limits=[],
+    paired = pair('a_x', [Passage(100.0, 5.0, 1.0)], [Passage(90.0, 5.0, 1.0)],
+                   allowed=[Allowed(most=6.0)], resonances=[])
+    alone = pair('a_z', [], [Passage(91.0, 5.0, 1.0), Passage(300.0, 5.0, 1.0)], allowed=[],
                  resonances=[])
     assert told_once(paired + alone) == [paired[0], alone[1]]
+
+
+def test_peak_that_does_not_stand_out_is_not_missing():
+    lost, hidden = (PeakPair('a_x', Passage(100.0, 5.0, 0.1), None, 0.1, Allowed(4.0, 6.0, shown))
+                    for shown in (3.0, 9.0))
+    assert 'was not measured' in peak_fault(lost, margin=0.05)
+    assert peak_fault(hidden, margin=0.05) == ''

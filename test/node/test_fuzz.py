@@ -18,6 +18,7 @@ import zstandard
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.recover import recover
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP, Measured, Predicted, Samples
 from rotorsoil_ros.machine.band import SoilSpread
@@ -27,6 +28,7 @@ from rotorsoil_ros.wire.cdr import JointStateReader
 from rotorsoil_ros.wire.handlers import inlet, TOPICS
 from rotorsoil_ros.wire.messages import Encoder, Topics
 
+DISC = Channel('disc_1', '', 'x')
 MANY = settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
 SOME = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 MAGIC = b'\x89MCAP0\r\n'
@@ -125,13 +127,13 @@ def test_whatever_is_measured_in_whatever_order_is_judged_without_a_traceback(
         elif kind == 'samples':
             count, value = rest
             stamps = np.minimum(stamp + 10**6 * np.arange(count), LAST_STAMP)
-            monitor.on_samples(Samples('m', 'disc_1_x', stamps, np.full(count, value)))
+            monitor.on_samples(Samples('m', DISC, stamps, np.full(count, value)))
         elif kind == 'tick':
             monitor.tick(stamp, stale_after_s=3.0)
         else:
             channel, *values = rest
             one, other = (np.array([[value]]) for value in values)
-            monitor.on_measured(Measured('m', kind, at, (channel,), one, other))
+            monitor.on_measured(Measured('m', kind, at, (Channel.parse(channel),), one, other))
     monitor.tick(LAST_STAMP, stale_after_s=3.0)
     assert sum(len(list(encoder.encode(event))) for event in events)
     is_sane(events, machine)

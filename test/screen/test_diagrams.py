@@ -67,7 +67,7 @@ def shown(machine):
 def measured(channel, amplitude, phase, *, speed=300.0, stamp_ns=START):
     return Compared(
         'fan', np.array([stamp_ns]), np.array([speed]), (channel,), np.array([[amplitude]]),
-        np.array([[phase]]), UNKNOWN, UNKNOWN.astype(complex), UNKNOWN, UNKNOWN)
+        np.array([[phase]]), UNKNOWN, UNKNOWN.astype(complex), *[UNKNOWN] * 4)
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from rotorsoil_ros.events import (
     Band,
     Compared,
     Diagnostics,
+    Expected,
     Level,
     Model,
     Remark,
@@ -73,7 +74,7 @@ def compared(machine, channels, amplitude, phase, *, speed=300.0, start=START):
     unknown = np.full(amplitude.shape, np.nan)
     return Compared(
         'fan', start + 10 * PERIOD * np.arange(len(amplitude)), np.full(len(amplitude), speed),
-        channels, amplitude, phase, unknown, unknown.astype(complex), unknown, unknown)
+        channels, amplitude, phase, unknown, unknown.astype(complex), *[unknown] * 4)
 
 
 def test_measured_values_lie_beside_the_predicted_ones(recorded, machine):
@@ -121,25 +122,26 @@ def test_band_lies_around_the_prediction_under_its_name(recorded, machine):
     assert names == [[['disc_1_x']]] * 3
 
 
-@pytest.fixture
-def judged(monkeypatch):
-    """Let criteria be found: no band, supports with a lowest frequency along z only."""
-    monkeypatch.setattr('rotorsoil_ros.screen.viewer.stored_criteria', lambda *_: Criteria(
-        None, (), (np.inf, 100.0)))
+def judged():
+    """Tell criteria: no band, supports with a lowest frequency along z only."""
+    return Expected('fan', START, Criteria(None, (), (np.inf, 100.0)).to_arrays())
 
 
 def zoned(predicted, measured):
     return Zoned('fan', START, predicted, measured)
 
 
-def test_limits_of_zones_follow_the_class_of_the_support(recorded, machine, judged):
-    path = recorded(predicted(machine, [60.0]), zoned({'bearing_1_housing_x': 'A'}, {}),
+def test_limits_of_zones_follow_the_class_of_the_support(recorded, machine):
+    path = recorded(judged(), predicted(machine, [60.0]), zoned({'bearing_1_housing_x': 'A'}, {}),
                     predicted(machine, [200.0], start=START + 2 * 10**9))
-    rigid, flexible = 1e3 * machine.case.zones.rigid[0], 1e3 * machine.case.zones.flexible[0]
+    zones = machine.case.zones
+    slow, fast = (1e3 * zones.of('rigid', speed)[0] for speed in (60.0, 200.0))
+    flexible = 1e3 * zones.of('flexible', 200.0)[0]
+    assert fast < flexible
     found = {axis: column(path, f'/fan/limits/{axis}/A_B', 'Scalars:scalars')[1]
              for axis in 'xz'}
-    assert found['z'] == [[pytest.approx(rigid)], [pytest.approx(flexible)]]
-    assert found['x'] == [[pytest.approx(rigid)], [pytest.approx(rigid)]]
+    assert found['z'] == [[pytest.approx(slow)], [pytest.approx(flexible)]]
+    assert found['x'] == [[pytest.approx(slow)], [pytest.approx(fast)]]
 
 
 def test_a_lane_shows_when_a_zone_changed_and_that_nothing_is_measured(recorded, machine):

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from scipy.signal import find_peaks
 
-from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.arrays import FloatArray, prominent_peaks
 from rotorsoil_ros.machine.response import Predictor
 
 # Points per piece of the table: its polynomials are smooth, a peak spans several.
@@ -49,7 +48,7 @@ def channel_peaks(predictor: Predictor, channel: str) -> list[Peak]:
         return np.abs(predictor.predict(speed).displacement[:, column])
 
     level = np.log(amplitude(speeds) + np.finfo(float).tiny)
-    found, _ = find_peaks(level, prominence=math.log(_PROMINENCE))
+    found = prominent_peaks(level, math.log(_PROMINENCE))
     peaks = []
     for index in found:
         near = np.linspace(speeds[index - 1], speeds[index + 1], 201)

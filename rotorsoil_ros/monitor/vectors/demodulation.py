@@ -6,10 +6,11 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.events import Demodulated, NANOSECONDS, Samples
-from rotorsoil_ros.monitor.history import History
-from rotorsoil_ros.monitor.orders import demodulate, LARGEST_ACCELERATION, OrderVector
+from rotorsoil_ros.monitor.vectors.history import History
+from rotorsoil_ros.monitor.vectors.orders import demodulate, LARGEST_ACCELERATION, OrderVector
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
 FITTED = (1, 2, 3)  # a harmonic that is there and not fitted would disturb the others
@@ -20,7 +21,7 @@ MOST = 1 << 16  # samples of a channel that wait for their speed
 class Demodulator:
     """Keeps the samples of one channel until enough turns of the rotor are known for them."""
 
-    def __init__(self, machine: str, channel: str, history: History, *, turns: float) -> None:
+    def __init__(self, machine: str, channel: Channel, history: History, *, turns: float) -> None:
         self._machine, self._channel = machine, channel
         self._history = history
         self._turns = turns

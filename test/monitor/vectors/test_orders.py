@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
-from rotorsoil_ros.monitor.orders import demodulate, order_vectors, SpeedTrack
+from rotorsoil_ros.monitor.vectors.orders import demodulate, order_vectors, SpeedTrack
 
 X1, X2 = 40e-6 * np.exp(0.7j), 6e-6 * np.exp(-2.0j)
 RATE_HZ = 2000.0

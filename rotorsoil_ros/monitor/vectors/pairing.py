@@ -1,7 +1,7 @@
 """To which speed does a measured vector belong? Amplitudes, phases and speeds find each other."""
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 from typing import TypeAlias
@@ -9,15 +9,18 @@ from typing import TypeAlias
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, FloatArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Demodulated, Measured, NANOSECONDS
-from rotorsoil_ros.monitor.history import History
-from rotorsoil_ros.monitor.points import SLOW_ROLL_WINDOW
+from rotorsoil_ros.monitor.vectors.history import History
 
 MOST = 1024  # vectors that wait; what waits longer is given up
-LARGEST = 1e3  # [m, rad]; no machine moves further
+LARGEST_MOTION = 1e3  # [m, rad]; no machine moves further
 PATIENCE = 2  # ticks after which an amplitude goes without its phase
 
-Names: TypeAlias = tuple[str, ...]
+# A slow-roll vector is the mean of what was measured within this share of its speed.
+SLOW_ROLL_WINDOW = 0.05
+
+Names: TypeAlias = tuple[Channel, ...]
 
 
 @dataclass(slots=True)
@@ -27,11 +30,11 @@ class Vectors:
 
     Attributes
     ----------
-    stamp_ns, channels : int, tuple of str
+    stamp_ns, channels : int, tuple of Channel
         When [ns] and where.
     amplitude, phase : (channels,) float array
         Of the displacement [m, rad], [rad].
-    swing, swing_phase : (channels,) float array
+    velocity, velocity_phase : (channels,) float array
         Of the velocity [m/s, rad/s], [rad].
     deviation : (channels,) float array
         Standard error of the amplitude [m, rad], 0 where it is not known.
@@ -44,8 +47,8 @@ class Vectors:
     channels: Names
     amplitude: FloatArray | None = None
     phase: FloatArray | None = None
-    swing: FloatArray | None = None
-    swing_phase: FloatArray | None = None
+    velocity: FloatArray | None = None
+    velocity_phase: FloatArray | None = None
     deviation: FloatArray = field(default_factory=lambda: np.zeros(0))
     speed: float = math.nan
     ticks: int = field(default=0, compare=False)
@@ -57,22 +60,22 @@ class Vectors:
     def put(self, quantity: str, displacement: FloatArray, velocity: FloatArray) -> None:
         """Keep one half."""
         if quantity == 'amplitude':
-            self.amplitude, self.swing = displacement, velocity
+            self.amplitude, self.velocity = displacement, velocity
         else:
-            self.phase, self.swing_phase = displacement, velocity
+            self.phase, self.velocity_phase = displacement, velocity
 
     def displacement(self) -> tuple[FloatArray, FloatArray]:
         """Return amplitude and phase; a velocity becomes one where nothing else was measured."""
         assert self.amplitude is not None
-        assert self.swing is not None
+        assert self.velocity is not None
         amplitude = self.amplitude
         phase = np.full(len(amplitude), np.nan) if self.phase is None else self.phase
         other = np.isnan(amplitude)
         if other.any() and self.speed > 0.0:
-            amplitude = np.where(other, self.swing / self.speed, amplitude)
-            if self.swing_phase is not None:
-                phase = np.where(other, self.swing_phase - 0.5 * np.pi, phase)
-        possible = (amplitude >= 0.0) & (amplitude <= LARGEST)
+            amplitude = np.where(other, self.velocity / self.speed, amplitude)
+            if self.velocity_phase is not None:
+                phase = np.where(other, self.velocity_phase - 0.5 * np.pi, phase)
+        possible = (amplitude >= 0.0) & (amplitude <= LARGEST_MOTION)
         return np.where(possible, amplitude, np.nan), np.where(np.isfinite(phase), phase, np.nan)
 
 
@@ -125,7 +128,11 @@ class Pairing:
                 self._part(key)
 
     def ready(self, *, is_tick: bool = False) -> Iterator[Vectors]:
-        """Yield vectors whose speed is known; at a tick those too that no later speed follows."""
+        """
+        Yield vectors with their speeds; at a tick those too that no later speed follows.
+
+        The speed of a vector near which none was told is NaN.
+        """
         history, tolerance_ns = self._history, self._tolerance_ns
         for _ in range(len(self._waiting)):
             vectors = self._waiting.popleft()
@@ -136,10 +143,8 @@ class Pairing:
                 self._waiting.append(vectors)
                 continue
             vectors.speed = history.speed_near(vectors.stamp_ns, tolerance_ns=tolerance_ns)
-            if math.isnan(vectors.speed):
-                self.given_up += 1
-            else:
-                yield vectors
+            self.given_up += math.isnan(vectors.speed)
+            yield vectors
 
     def _part(self, key: tuple[int, Names]) -> None:
         """Let a half go: an amplitude alone is of use, a phase alone is not."""
@@ -157,22 +162,71 @@ class Pairing:
             self.given_up += 1
 
 
+@dataclass(slots=True)
+class _SlowRoll:
+    """What one channel has measured at slow roll."""
+
+    total: complex = 0j
+    power: float = 0.0
+    count: int = 0
+    visits: int = 1
+    has_left: bool = False
+
+    def learn(self, vector: complex) -> None:
+        if self.has_left:
+            self.total, self.power, self.count, self.has_left = 0j, 0.0, 0, False
+            self.visits += 1
+        self.total += vector
+        self.power += abs(vector) ** 2
+        self.count += 1
+
+    @property
+    def mean(self) -> complex:
+        return self.total / self.count
+
+    @property
+    def scatter(self) -> float:
+        return math.sqrt(max(self.power / self.count - abs(self.mean) ** 2, 0.0))
+
+
 class Runout:
     """
     The mean vector of each channel near the slow-roll speed, as far as it has been seen.
 
     A machine that comes back to slow roll is measured anew: runout changes with temperature.
+
+    Parameters
+    ----------
+    slow_roll_speed : float
+        [rad/s]; NaN: nothing is subtracted.
+    hindsight : mapping of str to complex
+        What a run will show later, by channel: subtracted until the channel itself has seen
+        slow roll. A machine that is watched while it runs has none.
+
     """
 
-    def __init__(self, slow_roll_speed: float) -> None:
+    def __init__(
+        self, slow_roll_speed: float, hindsight: Mapping[str, complex] | None = None,
+    ) -> None:
         self._speed = slow_roll_speed
-        self._sums: dict[str, complex] = {}
-        self._counts: dict[str, int] = {}
-        self._has_left: set[str] = set()
+        self._hindsight = hindsight or {}
+        self._seen: dict[str, _SlowRoll] = {}
+        self.first: dict[str, complex] = {}
+        self.was_missed = False
 
     def is_rolling(self, speed: FloatArray) -> BoolArray:
         """Return which speeds, (n,) [rad/s], are those of slow roll; none if none is named."""
         return np.asarray(np.abs(speed - self._speed) <= SLOW_ROLL_WINDOW * self._speed)
+
+    def of(self, channel: str) -> complex:
+        """Return the runout of a channel as it is known now [m, rad], NaN if it is not."""
+        if seen := self._seen.get(channel):
+            return seen.mean
+        return self._hindsight.get(channel, complex(math.nan, math.nan))
+
+    def scatter(self, channel: str) -> float:
+        """Return the standard deviation of what was measured at slow roll [m, rad]."""
+        return self._seen[channel].scatter if channel in self._seen else 0.0
 
     def subtract(
         self, channels: Sequence[str], speed: FloatArray, amplitude: FloatArray,
@@ -191,27 +245,27 @@ class Runout:
             Displacements [m, rad], [rad]; without a phase nothing can be subtracted.
 
         """
-        if np.isnan(self._speed):
+        if math.isnan(self._speed):
             return amplitude, phase
         vectors = amplitude * np.exp(1j * phase)
         rolling = self.is_rolling(speed)
         for column, channel in enumerate(channels):
             for row in np.flatnonzero(np.isfinite(vectors[:, column])).tolist():
-                vectors[row, column] -= self._of(
+                vectors[row, column] -= self._after(
                     channel, complex(vectors[row, column]), rolls=bool(rolling[row]))
         known = np.isfinite(vectors)
         return (np.where(known, np.abs(vectors), amplitude),
                 np.where(known, np.angle(vectors), phase))
 
-    def _of(self, channel: str, vector: complex, *, rolls: bool) -> complex:
+    def _after(self, channel: str, vector: complex, *, rolls: bool) -> complex:
         """Return the runout of a channel, after learning from a vector."""
-        if not rolls:
-            self._has_left.add(channel)
-        elif channel in self._has_left or channel not in self._counts:
-            self._has_left.discard(channel)
-            self._sums[channel], self._counts[channel] = vector, 1
-        else:
-            self._sums[channel] += vector
-            self._counts[channel] += 1
-        count = self._counts.get(channel, 0)
-        return self._sums[channel] / count if count else 0j
+        if rolls:
+            seen = self._seen.setdefault(channel, _SlowRoll())
+            seen.learn(vector)
+            if seen.visits == 1:
+                self.first[channel] = seen.mean
+        elif channel in self._seen:
+            self._seen[channel].has_left = True
+        known = self.of(channel)
+        self.was_missed |= math.isnan(known.real)
+        return 0j if math.isnan(known.real) else known

@@ -8,13 +8,17 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.monitor.orders import SpeedTrack, turns_with
-from rotorsoil_ros.monitor.zones import STEADY
+from rotorsoil_ros.monitor.vectors.orders import SpeedTrack, turns_with
 
-LATEST = 256  # speeds kept as they came
+LATEST = 8192  # speeds kept as they came: a vector out of samples comes a second late
 TRACK = 4096  # and such as lie a while apart
 TRACK_NS = NANOSECONDS // 100
 STEADY_S = 2.0
+FASTEST = 1e6  # [rad/s]; no rotor turns faster
+
+# Slower than this share of itself per second a speed counts as constant [1/s].
+STEADY = 0.005
+
 ROW = np.dtype([('stamp_ns', '<i8'), ('speed', '<f8'), ('angle', '<f8')])
 
 
@@ -30,6 +34,7 @@ class History:
         self._track: deque[tuple[int, float, float]] = deque(maxlen=TRACK)
         self._arrays: tuple[Any, ...] | None = None
         self.last_ns = -1
+        self.epoch = 0
         self._thinned_ns = -TRACK_NS
 
     def add(self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> None:
@@ -38,7 +43,7 @@ class History:
             stamp = row[0]
             if stamp < self.last_ns:
                 self.forget()
-            if stamp == self.last_ns or not math.isfinite(row[1]):
+            if stamp == self.last_ns or not abs(row[1]) <= FASTEST:
                 continue
             self.last_ns = stamp
             self._latest.append(row[:2])
@@ -48,7 +53,8 @@ class History:
                 self._arrays = None
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Begin anew, in another epoch: what came before has no place in this time."""
+        self.epoch += 1
         self._latest.clear()
         self._track.clear()
         self._arrays = None
@@ -105,3 +111,21 @@ class History:
     def last_speed(self) -> float:
         """The latest speed [rad/s], NaN if there is none."""
         return self._latest[-1][1] if self._latest else math.nan
+
+
+def nearest(
+    wanted: IntArray, given: IntArray, *, tolerance_s: float = math.inf,
+) -> IntArray:
+    """
+    Return the index of the nearest of given stamps [ns], ascending; the earlier of two.
+
+    It is -1 beyond a tolerance [s].
+    """
+    if not len(given):
+        return np.full(len(wanted), -1)
+    after = np.clip(np.searchsorted(given, wanted), 0, len(given) - 1)
+    before = np.maximum(after - 1, 0)
+    index = np.where(wanted - given[before] <= given[after] - wanted, before, after)
+    index = np.where(wanted > given[-1], len(given) - 1, index)
+    near = np.abs(given[index] - wanted) <= tolerance_s * NANOSECONDS
+    return np.asarray(np.where(near, index, -1))

@@ -7,8 +7,8 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
+from rotorsoil_ros.machine.peaks import channel_peaks, Peak, resolved_speeds, resonances
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.monitor.peaks import channel_peaks, Peak, resolved_speeds, resonances
 from rotorsoil_ros.units import rpm_to_rad_s
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
@@ -62,6 +62,6 @@ def test_resonances_list_each_once_with_the_channel_that_moves_most(machine):
 def test_resonances_leave_out_what_is_a_thousand_times_smaller(machine, monkeypatch):
     _, predictor = machine
     given = {'a': [Peak(1.0, 'a', 1.0)], 'b': [Peak(2.0, 'b', 2e-3), Peak(3.0, 'b', 5e-4)]}
-    monkeypatch.setattr('rotorsoil_ros.monitor.peaks.channel_peaks',
+    monkeypatch.setattr('rotorsoil_ros.machine.peaks.channel_peaks',
                         lambda _, channel: given[channel])
     assert resonances(predictor, ('a', 'b')) == [Peak(1.0, 'a', 1.0), Peak(2.0, 'b', 2e-3)]

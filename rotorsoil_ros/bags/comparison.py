@@ -1,0 +1,191 @@
+"""Did a machine behave as predicted? A log is fed to the judge, with the whole run known."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray
+from rotorsoil_ros.bags.feed import feed, Inputs
+from rotorsoil_ros.case import cache, config
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.zone_limits import ZoneLimits
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.monitor.comparison import Comparison, Run
+from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.monitor.points import Collector
+from rotorsoil_ros.monitor.rules import Judging, Matching, Rules
+from rotorsoil_ros.wire.handlers import ROTOR_JOINT
+
+Progress = Callable[[int, int], None]
+Descriptions = Sequence[tuple[int, Mapping[str, Any]]]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """
+    How a log is to be compared, where that differs from what the case says.
+
+    Attributes
+    ----------
+    machine, rotor_joint : str
+        Which machine of the log (empty: the only one), and the joint that tells its speed.
+    matching : Matching
+        How points are matched and cleaned.
+    amplitude_margin : float
+        Share by which an amplitude may lie outside the band and still count as inside.
+    zones : ZoneLimits or None
+        Of housing velocity; None: those of the case.
+    soil_factor : float or None
+        By which G may be higher or lower; None: what the case says.
+    turns : float
+        Turns of the rotor that make one vector of raw samples.
+
+    """
+
+    machine: str = ''
+    rotor_joint: str = ROTOR_JOINT
+    matching: Matching = field(default_factory=Matching)
+    amplitude_margin: float = Rules().amplitude_margin
+    zones: ZoneLimits | None = None
+    soil_factor: float | None = None
+    turns: float = Judging().turns
+
+
+def compare(
+    log: Path, case: Case | Path | None = None, wish: Wish | None = None, *,
+    cache_directory: Path | None = None, progress: Progress | None = None,
+) -> Comparison:
+    """
+    Hold what a log tells of a machine against its prediction.
+
+    Parameters
+    ----------
+    log : Path
+        Bag directory or MCAP file with the topics of a machine, under any namespace.
+    case : Case, Path or None
+        The machine; None: the case that the log was answered with, which it carries.
+    wish : Wish
+        How to compare.
+    cache_directory : Path or None
+        Of tables; the user's by default.
+    progress : callable
+        Called with the number of messages read and their total.
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, holds several machines or none, nothing measured, or no case.
+
+    """
+    wish = wish or Wish()
+    inputs = Inputs.of(log, machine=wish.machine)
+    if not inputs.is_measured:
+        raise InputError(f'{log}: {inputs.machine}: nothing measured in the log (topics '
+                         f'{inputs.machine}/measured/...)')
+    descriptions = inputs.descriptions()
+    if isinstance(case, Path):
+        case = config.load(case)
+    case = case or _logged_case(log, descriptions)
+    spread = case.uncertainty if wish.soil_factor is None else replace(
+        case.uncertainty, shear_modulus_factor=wish.soil_factor)
+    expectation = Expectation.of(case, cache.directory(cache_directory), spread)
+    reading = _Reading(inputs, expectation, wish, descriptions, progress)
+    found, hindsight = reading.read({})
+    if hindsight:  # a slow roll that comes late is the runout of what was before it, too
+        found, _ = reading.read(hindsight)
+    return found
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """One log, to be read once or twice."""
+
+    inputs: Inputs
+    expectation: Expectation
+    wish: Wish
+    descriptions: Descriptions
+    progress: Progress | None
+
+    def read(self, hindsight: Mapping[str, complex]) -> tuple[Comparison, Mapping[str, complex]]:
+        """Return the comparison, and the runouts that a second reading would know earlier."""
+        expectation, machine = self.expectation, self.inputs.machine
+        rules = Rules(matching=self.wish.matching, amplitude_margin=self.wish.amplitude_margin,
+                      zones=self.wish.zones or expectation.case.zones)
+        collector, unbalances = Collector(), [(0, expectation.case.unbalance)]
+        monitor = Monitor(
+            machine, expectation.table, expectation.case.unbalance, sinks=[collector],
+            judging=Judging(rules, self.wish.turns), hindsight=hindsight)
+        monitor.judge.take_criteria(expectation.criteria(expectation.case.unbalance))
+
+        def take(stamp_ns: int, description: Mapping[str, Any]) -> None:
+            unbalance = self._unbalance(description)
+            if unbalance is not None and not np.array_equal(unbalance, unbalances[-1][1]):
+                unbalances.append((stamp_ns, unbalance))
+                monitor.set_unbalance(unbalance)
+                monitor.judge.take_criteria(expectation.criteria(unbalance))
+
+        done = 0
+        for number in feed(self.inputs, monitor, {}, rotor_joint=self.wish.rotor_joint,
+                           on_description=take):
+            done += number
+            if self.progress:
+                self.progress(done, self.inputs.number)
+        judge, run = monitor.judge, self._run(monitor, collector, unbalances)
+        late = judge.runout.first if judge.runout.was_missed else {}
+        return Comparison(run, expectation, judge.account, judge.runout,
+                          collector.points()), late
+
+    def _run(
+        self, monitor: Monitor, collector: Collector, unbalances: list[tuple[int, ComplexArray]],
+    ) -> Run:
+        stamp_ns, speed = collector.speeds()
+        if not len(stamp_ns):
+            raise InputError(f'{self.inputs.bag}: {monitor.machine}: no speed in the log '
+                             '(joint_states or rotor/speed)')
+        return Run(monitor.machine, stamp_ns, speed, unbalances, self._notes(monitor),
+                   monitor.judge.is_synthetic)
+
+    def _notes(self, monitor: Monitor) -> list[str]:
+        """Return what in the log could not be used, and on what the prediction rests."""
+        notes = []
+        if monitor.judge.is_synthetic:
+            notes.append('SYNTHETIC signals: computed, not measured (so says their frame)')
+        notes += [f'{channel}: measured as 1X vectors and as raw samples; from the first vector '
+                  'on these are used'
+                  for channel in sorted(monitor.judge.told_twice)]
+        if number := monitor.health.counts['malformed']:
+            notes.append(f'{number} messages are malformed and were left out')
+        if not self.descriptions:
+            notes.append('the log holds no prediction: the case was asked, with its own unbalance')
+        elif any(self._unbalance(description) is None for _, description in self.descriptions):
+            notes.append('the predictions in the log rest on another table than the case: the '
+                         'case was asked anew, with its own unbalance')
+        return notes
+
+    def _unbalance(self, description: Mapping[str, Any]) -> ComplexArray | None:
+        """Return the unbalance that a node took, if it answered from the table of the case."""
+        tables = description.get('tables')
+        if not isinstance(tables, Mapping) or (
+                tables.get('response') != self.expectation.table.key):
+            return None
+        try:
+            planes = {str(plane): float(value['moment_kg_m']) * complex(
+                np.exp(1j * float(value['phase_rad'])))
+                for plane, value in description['unbalance'].items()}
+        except (AttributeError, KeyError, TypeError, ValueError):
+            return None
+        return self.expectation.vector(planes)
+
+
+def _logged_case(log: Path, descriptions: Descriptions) -> Case:
+    """Return the case that a log carries: the last, where it was reloaded."""
+    for _, description in reversed(descriptions):
+        content, files = description.get('document'), description.get('files', {})
+        if isinstance(content, dict) and isinstance(files, dict):
+            return config.case_of(log, content, files={
+                str(name): str(text) for name, text in files.items()})
+    raise InputError(f'{log}: does not carry the case it was answered with; give the CASE')

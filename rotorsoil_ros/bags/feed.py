@@ -1,0 +1,173 @@
+"""How does a recorded run reach a monitor? Message by message, ticking at its own full seconds."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.profile import BATCH, Place, place
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.events import LAST_STAMP, NANOSECONDS
+from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.wire.cdr import Cursor
+from rotorsoil_ros.wire.definitions import STRING
+from rotorsoil_ros.wire.handlers import Inlet, inlet, Outlet, ROTOR_JOINT, SPEED_TOPICS
+from rotorsoil_ros.wire.messages import Records
+
+AT_ONCE = 128  # speeds that may be told before measurements of the same time find them
+
+Described = Callable[[int, Mapping[str, Any]], None]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """
+    What a bag tells of one machine.
+
+    Attributes
+    ----------
+    bag : Path
+        Bag directory or MCAP file.
+    namespace, machine : str
+        Of its topics.
+    topics : mapping of str to (Place, int)
+        Place of every input, and how many messages it has.
+    models : tuple of str
+        Topics on which a node told what its predictions rest on.
+
+    """
+
+    bag: Path
+    namespace: str
+    machine: str
+    topics: Mapping[str, tuple[Place, int]]
+    models: tuple[str, ...]
+
+    @classmethod
+    def of(cls, bag: Path, *, machine: str = '', like: str = '') -> 'Inputs':
+        """
+        Return the inputs of a machine.
+
+        Parameters
+        ----------
+        bag : Path
+            Bag directory or MCAP file.
+        machine : str
+            Its name; empty: the only one.
+        like : str
+            Name to choose where the bag tells of several machines and none is named.
+
+        Raises
+        ------
+        InputError
+            If the bag cannot be read, or does not tell the speed of just one such machine.
+
+        """
+        listed = bag_reader.topics(bag)
+        found = {topic: (where, number) for topic, (kind, number) in listed.items()
+                 if (where := place(topic, kind))}
+        speaking = {(where.namespace, where.machine) for where, number in found.values()
+                    if where.name in SPEED_TOPICS and number}
+        wanted = machine or (like if len(speaking) > 1 else '')
+        chosen = {each for each in speaking if wanted in ('', each[1])}
+        if len(chosen) != 1:
+            speeds = ', '.join(topic for topic, (where, _) in found.items()
+                               if where.name in SPEED_TOPICS) or 'none'
+            needed = machine or (f'one machine, or one called {like}' if like else 'one machine')
+            raise InputError(f'{bag}: must tell the speed of {needed} on joint_states or '
+                             f'rotor/speed; speed topics: {speeds}')
+        [(namespace, name)] = chosen
+        return cls(bag, namespace, name, {
+            topic: (where, number) for topic, (where, number) in found.items()
+            if (where.namespace, where.machine) == (namespace, name)},
+            tuple(topic for topic, (kind, _) in listed.items()
+                  if kind == STRING and topic.endswith(f'/{name}/model')))
+
+    @property
+    def number(self) -> int:
+        """Number of messages."""
+        return sum(number for _, number in self.topics.values())
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether anything but speeds is told."""
+        return any(number and where.name not in SPEED_TOPICS
+                   for where, number in self.topics.values())
+
+    def descriptions(self) -> list[tuple[int, Mapping[str, Any]]]:
+        """Return what a node told of its model, with the time when; what is malformed is not."""
+        found: list[tuple[int, Mapping[str, Any]]] = []
+        for batch in bag_reader.batches(
+                self.bag, lambda topic, _: topic in self.models, at_most=1):
+            if (description := _description(batch.payloads[0])) is not None:
+                found.append((batch.log_time_ns[0], description))
+        return found
+
+
+def feed(
+    inputs: Inputs, monitor: Monitor, description: Mapping[str, object], *,
+    log: Outlet = lambda records: None, rotor_joint: str = ROTOR_JOINT,
+    on_description: Described | None = None,
+) -> Iterator[int]:
+    """
+    Hand a run to a monitor, from its first message to its end; yield how many are done.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is told of the machine.
+    monitor : Monitor
+        Who listens.
+    description : mapping
+        What its predictions rest on.
+    log : callable
+        Where accepted messages are written, byte for byte.
+    rotor_joint : str
+        Joint whose velocity is the rotor speed.
+    on_description : callable
+        Takes what a node told of its model when the run was recorded, at its place in time.
+
+    """
+    inlets: dict[str, Inlet] = {
+        topic: inlet(where.name, topic, monitor, rotor_joint=rotor_joint, log=log)
+        for topic, (where, _) in inputs.topics.items()}
+    models = inputs.models if on_description is not None else ()
+    # Where more is told than speeds, what belongs together has to come together.
+    at_most, span_ns = (AT_ONCE, NANOSECONDS) if inputs.is_measured else (BATCH, LAST_STAMP)
+    second = now_ns = None
+    for batch in bag_reader.batches(
+            inputs.bag, lambda topic, _: topic in inlets or topic in models,
+            at_most=at_most, span_ns=span_ns):
+        if batch.topic in models:
+            assert on_description is not None
+            _tell(batch, on_description)
+            continue
+        if now_ns is None:
+            monitor.begin(batch.log_time_ns[0], description)
+        elif batch.log_time_ns[0] // NANOSECONDS != second:
+            monitor.tick(batch.log_time_ns[0] // NANOSECONDS * NANOSECONDS,
+                         stale_after_s=math.inf)
+        second = batch.log_time_ns[0] // NANOSECONDS
+        inlets[batch.topic](batch.log_time_ns, batch.payloads)
+        now_ns = batch.log_time_ns[-1]
+        yield len(batch.payloads)
+    if now_ns is not None:
+        monitor.tick(now_ns, stale_after_s=math.inf)
+        monitor.finish(now_ns)
+
+
+def _tell(batch: Records, on_description: Described) -> None:
+    for stamp, payload in zip(batch.log_time_ns, batch.payloads, strict=True):
+        if (description := _description(payload)) is not None:
+            on_description(stamp, description)
+
+
+def _description(payload: bytes) -> dict[str, Any] | None:
+    try:
+        found = json.loads(Cursor(payload).text())
+    except (InputError, json.JSONDecodeError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
