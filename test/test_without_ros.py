@@ -54,7 +54,7 @@ def test_offline_verbs_need_no_ros(without_ros, tmp_path):
 
 
 def test_wire_and_bags_are_imported_without_ros(without_ros):
-    rooms = ('wire.messages', 'wire.handlers', 'bags.recorder', 'bags.feed', 'bags.comparison', 'bags.predict',
-             'bags.synthetic', 'bags.retention')
+    rooms = ('wire.messages', 'wire.handlers', 'bags.recorder', 'bags.feed', 'bags.comparison',
+             'bags.predict', 'bags.synthetic', 'bags.retention')
     done = without_ros('-c', f'for room in {rooms}: __import__(f"rotorsoil_ros.{{room}}")')
     assert done.returncode == 0, done.stderr
