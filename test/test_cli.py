@@ -142,6 +142,22 @@ def test_cases_as_they_are_warn_of_nothing_but_slow_cones(case, count, capsys):
     assert all('below 1.5 cones damp too much' in line for line in warnings)
 
 
+def test_a_peak_that_no_machine_survives_is_remarked(capsys):
+    # 0.01 kg m on 0.7 kg is an eccentricity of 14 mm, on rigid ground without damping to speak of.
+    main(['check', PAPER, '--set', 'support.model=rigid', '--set', 'unbalances.0.moment=0.01'])
+    said = capsys.readouterr().out
+    assert said.count("is more than 5% of the shaft's length, 0.762 m") == 2
+
+
+def test_error_of_the_solver_is_not_taken_for_that_of_the_model(capsys, tmp_path):
+    assert main(['tabulate', FAN, '--cache', str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith('largest error of the solver') for line in lines)
+    assert any(line.startswith('block: model error') and 'cones under a disc: stiffness within 25%'
+               in line and 'discs for a rectangle of 1.5 to 1: stiffness off by up to 16%' in line
+               for line in lines)
+
+
 @pytest.mark.slow
 def test_infinite_elements_have_no_such_warning(capsys, tmp_path):
     settings = ['--set', 'support.model=infinite_elements', '--cache', str(tmp_path)]

@@ -154,7 +154,7 @@ def test_no_critical_speed_is_said_with_how_far_was_looked(capsys):
     arguments = ['campbell', PAPER, '--criticals', '--rpm', '100:1000:2']
     assert main(arguments) == 0
     said = capsys.readouterr()
-    assert said.out.splitlines() == ['speed_rad_s,whirl,damping_ratio,name']
+    assert said.out.splitlines() == ['speed_rad_s,whirl,damping_ratio']
     assert 'no critical speed from 100 up to 1000 rpm' in said.err
     assert main([*arguments, '--running', '900']) == 0
     assert 'no critical speed from 100 up to 1134 rpm' in capsys.readouterr().err

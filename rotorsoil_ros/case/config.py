@@ -15,6 +15,7 @@ from rotorsoil_ros.case.case_errors import Faults, message
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
 from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.ground.accuracy import gap
 from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import a0_range
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle, RigidSoil, Soil
@@ -86,6 +87,9 @@ class Case:
         document.override(content, overrides)
         return case_of(self.path, content, files=self.files)
 
+
+# Blocks that touch do not overlap.
+_ROUND_OFF = 1e-9
 
 # Natural modes above the running speed and excitation at twice the speed need the soil too.
 _HIGHEST_ORDER = 2.0
@@ -181,8 +185,21 @@ class _Builder:
             zones=self._zones(), content=self.content, files=self.files)
         with self.faults.at('rotor', entry=entries.rotor):
             CoupledModel(rotor, case.foundations, [RigidSoil() for _ in case.foundations])
+        self._refuse_overlap(case.foundations)
         self._refuse_unreachable_soil(case)
         return case
+
+    def _refuse_overlap(self, foundations: tuple[Foundation, ...]) -> None:
+        """Raise an InputError at the second of two blocks that stand on the same ground."""
+        for second, block in enumerate(foundations):
+            for first, other in enumerate(foundations[:second]):
+                apart = abs(block.centre_y - other.centre_y)
+                clear = gap(block.contact, other.contact, distance=apart)
+                if clear < -_ROUND_OFF * apart:
+                    raise self.faults.error(
+                        'foundations', second, problem=f'{block.name} must not overlap '
+                        f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap along '
+                        f'y: centres are {apart:.4g} m apart')
 
     def _refuse_unfit_support(self) -> None:
         entries, support = self.faults.entries, self.faults.entries.support

@@ -1,6 +1,6 @@
 """What can be said of a case before anything runs: derived quantities, and what looks odd."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 import math
 
 import numpy as np
@@ -9,6 +9,13 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.accuracy import (
+    CONE_ERROR,
+    gap,
+    mapping_error,
+    neglected_coupling,
+    side_ratio,
+)
 from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.stability import Stability
@@ -22,6 +29,9 @@ _LARGEST_A0 = 6.0
 _LARGEST_A0_INCOMPRESSIBLE = 2.0
 _LARGEST_ASPECT = 2.0
 _LARGEST_POISSON_RATIO = 0.45
+
+# Of the shaft's length: beyond, slopes are no longer small and no linear beam holds.
+_SURVIVED = 0.05
 
 
 def derived_quantities(
@@ -43,6 +53,9 @@ def derived_quantities(
         yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
     for foundation, model in zip(case.foundations, soil_models, strict=True):
         yield from _of_foundation(case, foundation, model)
+        told = model_error(case, foundation)
+        if told:
+            yield f'{foundation.name}: model error', told
 
 
 def _of_foundation(
@@ -69,6 +82,34 @@ def _of_foundation(
         yield f'{name}: {where} stiffness {dof}', stiffness
 
 
+def model_error(case: Case, foundation: Foundation) -> str:
+    """Return how far the model of the ground under a block may be off; empty if it has none."""
+    if case.support.model not in ('cone', 'infinite_elements') or case.support.geometry != 'disc':
+        return ''
+    parts = []
+    if case.support.model == 'cone':
+        parts.append(f'cones under a disc: stiffness within {CONE_ERROR:.0%}')
+    if isinstance(foundation.contact, Rectangle):
+        share, ratio = mapping_error(foundation.contact), side_ratio(foundation.contact)
+        off = f'up to {share:.0%}' if share < math.inf else 'more than 37%'
+        parts.append(f'discs for a rectangle of {ratio:.3g} to 1: stiffness off by {off}')
+    return '; '.join(parts) or 'infinite elements of a disc: within 0.5%'
+
+
+def _of_neighbours(case: Case) -> Iterator[str]:
+    """Yield which blocks are coupled through a soil that takes each as alone."""
+    if case.support.model == 'rigid':
+        return
+    for second, block in enumerate(case.foundations):
+        for other in case.foundations[:second]:
+            apart = abs(block.centre_y - other.centre_y)
+            coupling, change = neglected_coupling(block.contact, other.contact, distance=apart)
+            clear = gap(block.contact, other.contact, distance=apart)
+            yield (f'{block.name}: stands {max(clear, 0.0):.3g} m beside {other.name}; each is '
+                   'taken as alone on the ground: a load on one moves the other by up to '
+                   f'{coupling:.0%} of its own motion, and its own changes by up to {change:.0%}')
+
+
 def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
     """Return the dimensionless frequency of a block, omega b / c_s or omega r0 / c_s."""
     return omega * foundation.contact.characteristic_length / soil.shear_wave_speed
@@ -83,6 +124,7 @@ def warnings(case: Case) -> Iterator[str]:
             yield (f'{disc.name}: polar inertia {disc.polar_inertia:g} kg m^2 is more than twice '
                    f'the diametral {disc.diametral_inertia:g} kg m^2, which no body has')
     yield from _of_bearings(case)
+    yield from _of_neighbours(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):
@@ -161,6 +203,29 @@ def undecided(case: Case, error: NotSolvedError) -> str:
             'it at more frequencies, or without jumps (the response needs no modes)')
 
 
+def implausible(
+    case: Case, peaks: Iterable[tuple[str, float, float]],
+) -> Iterator[str]:
+    """
+    Yield which peaks no machine survives.
+
+    Parameters
+    ----------
+    case : Case
+        The machine.
+    peaks : iterable of (str, float, float)
+        Channel, speed [rad/s] and amplitude [m].
+
+    """
+    length = case.rotor.length
+    for channel, speed, amplitude in peaks:
+        if amplitude > _SURVIVED * length:
+            yield (f'the response peak of {amplitude:.3g} m of {channel} at '
+                   f'{rad_s_to_rpm(speed):.5g} rpm is more than {_SURVIVED:.0%} of the '
+                   f"shaft's length, {length:.3g} m: no machine survives it and no linear "
+                   'model holds; is the unbalance right, and is all damping in the case?')
+
+
 def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:
     if case.support.model == 'cone':
         yield from _of_cones(soil, foundation, speed_range=case.speed_range)
@@ -170,12 +235,11 @@ def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:
     if case.support.geometry != 'disc':
         yield (f'{foundation.name}: a strip radiates more than a block of finite length and '
                'holds y, rx and rz; geometry disc is the three-dimensional one')
-    elif isinstance(foundation.contact, Rectangle):
-        sides = foundation.contact.half_width, foundation.contact.half_length
-        aspect = max(sides) / min(sides)
-        if aspect > _LARGEST_ASPECT:
-            yield (f'{foundation.name}: contact is {aspect:.3g} times as long as wide; above '
-                   f'{_LARGEST_ASPECT:g} discs of equal area are off by more than 10 %')
+    elif side_ratio(foundation.contact) > _LARGEST_ASPECT:
+        share = mapping_error(foundation.contact)
+        off = f'up to {share:.0%}' if share < math.inf else 'more than 37%'
+        yield (f'{foundation.name}: contact is {side_ratio(foundation.contact):.3g} times as long '
+               f'as wide; discs of equal area, which stand for it, are off by {off}')
 
 
 def _of_cones(

@@ -1,6 +1,7 @@
 """Natural frequencies and critical speeds, as CSV."""
 
 from argparse import Namespace
+from collections.abc import Iterator, Sequence
 import math
 import sys
 
@@ -11,6 +12,7 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.margins import asked, half_power_factors
 from rotorsoil_ros.machine.mode_names import ModeNames
 from rotorsoil_ros.machine.modes import CriticalSpeed
@@ -59,22 +61,22 @@ def _criticals(arguments: Namespace, machine: Machine) -> int:
     low, high = _range_of(arguments, machine)
     with progress('solving') as _:
         criticals = machine.critical_speeds(rpm_range=(low, high))
-        names = ModeNames(machine.model)
-        sharp = half_power_factors(machine.model, criticals)
     plant = units_of(arguments) == PLANT
     header = ['speed_rpm' if plant else 'speed_rad_s', 'whirl', 'damping_ratio']
+    rows: list[tuple[float | str, ...]] = [
+        (critical.speed_rpm if plant else critical.speed, critical.whirl, critical.damping_ratio)
+        for critical in criticals]
     if arguments.running is not None:
         header += ['amplification_factor', 'separation_margin', 'required_margin',
-                   'half_power_factor']
-    rows = [(critical.speed_rpm if plant else critical.speed, critical.whirl,
-             critical.damping_ratio, *_margins(critical, factor, arguments.running),
-             names.of_critical(critical))
-            for critical, factor in zip(criticals, sharp, strict=True)]
+                   'half_power_factor', 'name']
+        running = rpm_to_rad_s(arguments.running)
+        rows = [(*row, *margins) for row, margins
+                in zip(rows, _margins(machine.model, criticals, running), strict=True)]
     _tell_unstable(machine, high)
     if not rows:
         print(f'{machine.case.path}: no critical speed from {low:g} up to {high:g} rpm',
               file=sys.stderr)
-    write_table(arguments.output, [*header, 'name'], rows)
+    write_table(arguments.output, header, rows)
     return 0
 
 
@@ -99,10 +101,11 @@ def _range_of(arguments: Namespace, machine: Machine) -> tuple[float, float]:
 
 
 def _margins(
-    critical: CriticalSpeed, half_power: float, running_rpm: float | None,
-) -> tuple[float, ...]:
-    if running_rpm is None:
-        return ()
-    running = rpm_to_rad_s(running_rpm)
-    return (critical.amplification_factor, critical.separation_margin(running),
-            critical.required_margin(running, half_power=half_power), half_power)
+    model: CoupledModel, criticals: Sequence[CriticalSpeed], running: float,
+) -> Iterator[tuple[float | str, ...]]:
+    """Yield factors, margins and name of each critical speed for a running speed [rad/s]."""
+    names = ModeNames(model)
+    for critical, half_power in zip(criticals, half_power_factors(model, criticals), strict=True):
+        yield (critical.amplification_factor, critical.separation_margin(running),
+               critical.required_margin(running, half_power=half_power), half_power,
+               names.of_critical(critical))

@@ -1,7 +1,7 @@
 """What a case is, and what has been computed of it, in words."""
 
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 import time
@@ -11,6 +11,8 @@ from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.summary import (
     clipped,
     derived_quantities,
+    implausible,
+    model_error,
     stability_doubts,
     undecided,
     unstable,
@@ -24,7 +26,7 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.margins import asked
 from rotorsoil_ros.machine.mode_names import ModeNames
 from rotorsoil_ros.machine.modes import critical_speeds
-from rotorsoil_ros.machine.peaks import resonances
+from rotorsoil_ros.machine.peaks import Peak, resonances
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.stability import Stability
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
@@ -49,8 +51,11 @@ def check(arguments: Namespace) -> int:
     _print_table(derived_quantities(case, model.soil_models))
     _print_table(_stability(table.stability))
     _print_table(criticals)
-    _print_table(_peaks(case, table))
-    for warning in chain(doubts, stability_doubts(table.stability), warnings(case)):
+    peaks = _peaks(case, table)
+    _print_table(_of_peaks(peaks))
+    found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
+    for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
+                         warnings(case)):
         print(f'warning: {warning}')
     growing = list(unstable(table.stability))
     for text in growing:
@@ -83,7 +88,10 @@ def tabulate(arguments: Namespace) -> int:
         ('covers', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm, '
                    f'{len(table.channels)} channels, {len(table.planes)} unbalance planes'),
         ('pieces', f'{len(table.pieces.resolved)} polynomials'),
-        ('largest error', f'{table.accuracy:.2g} of the local amplitude, at unseen speeds'),
+        ('largest error of the solver', f'{table.accuracy:.2g} of the local amplitude, at unseen '
+                                        'speeds; that of the models is another'),
+        *((f'{block.name}: model error', model_error(case, block)) for block in case.foundations
+          if model_error(case, block)),
         *(('unstable', f'{rad_s_to_rpm(left):.10g} to {rad_s_to_rpm(right):.10g} rpm: no steady '
                        'response') for left, right in table.stability.unstable.tolist()),
         *(('gap', f'{rad_s_to_rpm(left):.10g} to {rad_s_to_rpm(right):.10g} rpm: resonance '
@@ -104,7 +112,8 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
     yield f'{block}: covers', (f'a0 {table.a0_min:g} to {table.a0_max:g}, here {low:.4g} to '
                                f'{high:.4g} Hz')
     yield f'{block}: solves', f'{table.solves} of {table.unknowns} unknowns'
-    yield f'{block}: largest error', f'{table.measured_error:.2g}, at unseen frequencies'
+    yield (f'{block}: largest error of the solver',
+           f'{table.measured_error:.2g}, at unseen frequencies')
     yield f'{block}: file', str(cache.Cache(directory).path('compliance', models.key_of(soil)))
 
 
@@ -136,8 +145,9 @@ def _criticals(
         if critical.amplification_factor < _FELT:
             how.append('hardly felt')
         if critical.speed > high:
+            asks = critical.required_margin(high)
             how.append(f'{critical.speed / high - 1.0:.1%} above the speed range, '
-                       f'{critical.required_margin(high):.0%} is asked')
+                       + (f'{asks:.0%} is asked' if asks else 'no margin is asked'))
         lines.append((f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
                       f'{", ".join(how)}, {names.of_critical(critical)}'))
     if not lines:
@@ -146,9 +156,12 @@ def _criticals(
     return lines, clipped(span, wanted)
 
 
-def _peaks(case: Case, table: ResponseTable) -> Iterable[tuple[str, str]]:
+def _peaks(case: Case, table: ResponseTable) -> list[Peak]:
     moved = tuple(channel for channel in table.channels if not channel.is_rotation)
-    peaks = resonances(table.predictor(case.unbalance), moved)
+    return resonances(table.predictor(case.unbalance), moved)
+
+
+def _of_peaks(peaks: Sequence[Peak]) -> Iterable[tuple[str, str]]:
     for peak in peaks:
         yield (f'response peak {rad_s_to_rpm(peak.speed):.6g} rpm',
                f'{1e6 * peak.amplitude:.4g} um zero-to-peak at {peak.channel}')

@@ -8,6 +8,7 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model, soil_models
+from rotorsoil_ros.case.summary import warnings
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil
@@ -34,10 +35,10 @@ def test_each_foundation_has_the_soil_of_its_own_contact():
               'inertia: [1, 1, 1]}')
     case = load(PAPER, [
         'rotor.bearings.1.foundation=other',
-        f'foundations=[{{name: block, half_width: 0.5, half_length: 0.7, mass: 42, '
+        f'foundations=[{{name: block, half_width: 0.5, half_length: 0.2, mass: 42, '
         f'centre_of_gravity_height: 0.1, inertia: [1, 2, 3]}}, {second}]'])
     assert case.soil is not None
-    assert soil_models(case, NO_CACHE) == (ConeModel(case.soil, Rectangle(0.5, 0.7)),
+    assert soil_models(case, NO_CACHE) == (ConeModel(case.soil, Rectangle(0.5, 0.2)),
                                            ConeModel(case.soil, Circle(0.3)))
 
 
@@ -181,3 +182,29 @@ def test_hostile_key_stays_one_line():
     with pytest.raises(InputError) as caught:
         load(PAPER, ['a\nb=3'])
     assert '\n' not in str(caught.value)
+
+
+OVERLAP = Path(__file__).parents[1] / 'cases' / 'overlap' / 'case.yaml'
+
+
+def test_blocks_that_overlap_are_refused_by_name_and_length():
+    with pytest.raises(InputError) as refused:
+        load(OVERLAP)
+    assert str(refused.value) == (
+        f'{OVERLAP}: foundations.1: kb must not overlap ka (foundations.0), got 0.85 m of overlap '
+        'along y: centres are 0.65 m apart')
+    round_block = ['foundations.0.half_width=', 'foundations.0.half_length=',
+                   'foundations.0.radius=1.0', 'foundations.1.centre_y=1.9']
+    with pytest.raises(InputError, match=r'got 0\.1 m of overlap'):
+        load(OVERLAP, round_block)
+    with pytest.raises(InputError, match='must not overlap'):
+        load(OVERLAP, ['support.model=rigid'])
+
+
+def test_blocks_that_touch_stand_and_are_remarked_with_their_coupling():
+    touching = load(OVERLAP, ['foundations.1.centre_y=1.75'])
+    told = [text for text in warnings(touching) if 'beside' in text]
+    assert len(told) == 1
+    # Two squares 0.25 half-widths apart at a0 = 2: 0.45 (tables of rigid contacts).
+    assert told[0].startswith('kb: stands 0 m beside ka; each is taken as alone on the ground')
+    assert 'by up to 45%' in told[0]
