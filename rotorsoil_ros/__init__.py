@@ -23,6 +23,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rotorsoil_ros.bags.comparison import compare, Wish
     from rotorsoil_ros.bags.profile import read_profile
     from rotorsoil_ros.case.machine import load, Machine
     from rotorsoil_ros.channel import Channel
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from rotorsoil_ros.machine.foundation import Foundation
     from rotorsoil_ros.machine.modes import Campbell, CriticalSpeed
     from rotorsoil_ros.machine.response import Predictor, ResponseTable
+    from rotorsoil_ros.monitor.comparison import Comparison
+    from rotorsoil_ros.monitor.rules import Matching
+    from rotorsoil_ros.monitor.verdict import Verdict
     from rotorsoil_ros.prediction import Bounds, Prediction, Response
     from rotorsoil_ros.rotor.assembly import Rotor
     from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
@@ -45,16 +49,17 @@ if TYPE_CHECKING:
 
 __version__ = '0.1.0'
 __all__ = [
-    'Bearing', 'Bounds', 'Campbell', 'Channel', 'Circle', 'ComplianceTable', 'ConeModel',
-    'CoupledModel', 'CriticalSpeed', 'Disc', 'Foundation', 'InfiniteElementModel', 'InputError',
-    'Machine', 'Material', 'NotSolvedError', 'OutOfTableError', 'Pedestal', 'Prediction',
-    'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil',
-    'Rotor', 'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel', 'SoilSpread', 'load',
-    'read_profile',
+    'Bearing', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison', 'ComplianceTable',
+    'ConeModel', 'CoupledModel', 'CriticalSpeed', 'Disc', 'Foundation', 'InfiniteElementModel',
+    'InputError', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'OutOfTableError',
+    'Pedestal', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response',
+    'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel',
+    'SoilSpread', 'Verdict', 'Wish', 'compare', 'load', 'read_profile',
 ]
 
 # Which room a public name lives in.
 _ROOMS = {
+    'bags.comparison': ('Wish', 'compare'),
     'bags.profile': ('read_profile',),
     'case.machine': ('Machine', 'load'),
     'channel': ('Channel',),
@@ -69,6 +74,9 @@ _ROOMS = {
     'machine.foundation': ('Foundation',),
     'machine.modes': ('Campbell', 'CriticalSpeed'),
     'machine.response': ('Predictor', 'ResponseTable'),
+    'monitor.comparison': ('Comparison',),
+    'monitor.rules': ('Matching',),
+    'monitor.verdict': ('Verdict',),
     'prediction': ('Bounds', 'Prediction', 'Response'),
     'rotor.assembly': ('Rotor',),
     'rotor.bearing': ('Bearing', 'Pedestal'),

@@ -11,6 +11,7 @@ from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.bags.feed import feed, Inputs
 from rotorsoil_ros.case import cache, config
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.zone_limits import ZoneLimits
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.comparison import Comparison, Run
@@ -56,7 +57,8 @@ class Wish:
 
 
 def compare(
-    log: Path, case: Case | Path | None = None, wish: Wish | None = None, *,
+    log: Path | str, case: Machine | Case | Path | str | None = None,
+    wish: Wish | None = None, *,
     cache_directory: Path | None = None, progress: Progress | None = None,
 ) -> Comparison:
     """
@@ -64,10 +66,10 @@ def compare(
 
     Parameters
     ----------
-    log : Path
+    log : Path or str
         Bag directory or MCAP file with the topics of a machine, under any namespace.
-    case : Case, Path or None
-        The machine; None: the case that the log was answered with, which it carries.
+    case : Machine, Case, Path, str or None
+        The machine, or its case file; None: the case that the log carries.
     wish : Wish
         How to compare.
     cache_directory : Path or None
@@ -81,14 +83,16 @@ def compare(
         If the log cannot be read, holds several machines or none, nothing measured, or no case.
 
     """
-    wish = wish or Wish()
+    wish, log = wish or Wish(), Path(log)
     inputs = Inputs.of(log, machine=wish.machine)
     if not inputs.is_measured:
         raise InputError(f'{log}: {inputs.machine}: nothing measured in the log (topics '
                          f'{inputs.machine}/measured/...)')
     descriptions = inputs.descriptions()
-    if isinstance(case, Path):
-        case = config.load(case)
+    if isinstance(case, Machine):
+        cache_directory, case = cache_directory or case.directory, case.case
+    elif isinstance(case, (Path, str)):
+        case = config.load(Path(case))
     case = case or _logged_case(log, descriptions)
     spread = case.uncertainty if wish.soil_factor is None else replace(
         case.uncertainty, shear_modulus_factor=wish.soil_factor)

@@ -1,10 +1,7 @@
 """Predicted against measured: what a vibration engineer acts on."""
 
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
-import csv
-import io
-import json
+from collections.abc import Iterator
 import math
 from pathlib import Path
 
@@ -12,15 +9,19 @@ from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.zone_limits import ISO_10816_3
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import InputError, RotorSoilError
-from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
-from rotorsoil_ros.figures.report import channel_table, exclusions, page, peak_table, zone_table
+from rotorsoil_ros.figures.report import (
+    channel_table,
+    exclusions,
+    peak_table,
+    write_report,
+    zone_table,
+)
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.rules import Matching
 from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rpm_to_rad_s
 
 _VERDICT_FAILS = 1
-_DPI = 110
 
 
 def compare(arguments: Namespace) -> int:
@@ -84,28 +85,6 @@ def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[st
     if arguments.write_case is not None:
         write_case(found, arguments.write_case)
         yield f'updated case {arguments.write_case}'
-
-
-def write_report(
-    comparison: Comparison, out: Path, *, source: str, identification: Sequence[str] = (),
-) -> None:
-    """Write tables, pictures and the report of a comparison into a directory."""
-    with (out / 'comparison.csv').open('w', encoding='utf-8', newline='') as stream:
-        writer = csv.writer(stream, lineterminator='\n')
-        writer.writerow(HEADER)
-        writer.writerows(rows(comparison))
-    content = {**document(comparison), 'log': source, 'identification': list(identification)}
-    (out / 'comparison.json').write_text(
-        json.dumps(content, indent=1, allow_nan=False) + '\n', encoding='utf-8')
-    pictures = []
-    for name, caption, figure in all_figures(comparison):
-        stream_of = io.BytesIO()
-        figure.savefig(stream_of, dpi=_DPI, format='png')
-        (out / f'{name}.png').write_bytes(stream_of.getvalue())
-        pictures.append((caption, stream_of.getvalue()))
-    (out / 'report.html').write_text(
-        page(comparison, pictures, source=source, identification=identification),
-        encoding='utf-8')
 
 
 def _print(comparison: Comparison) -> None:

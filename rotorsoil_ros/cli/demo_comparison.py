@@ -10,9 +10,9 @@ from rotorsoil_ros.bags.comparison import compare
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.synthetic import profile, Truth, write_synthetic
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.cli.compare import write_report
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.figures.report import write_report
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.identification import (
     describe,

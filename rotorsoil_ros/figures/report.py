@@ -2,12 +2,17 @@
 
 import base64
 from collections.abc import Iterable, Sequence
+import csv
 from html import escape
+import io
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 
 import rotorsoil_ros
+from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.passage import Passage
 from rotorsoil_ros.monitor.verdict import Verdict
@@ -33,6 +38,7 @@ figure { margin: 0; break-inside: avoid; } figure img { width: 100%; }
 figcaption { font-size: 12px; color: #555; }
 """
 
+_DPI = 110
 ZONES = ('A', 'B', 'C', 'D')
 
 _WORDS = {
@@ -40,6 +46,42 @@ _WORDS = {
     Verdict.FAILS: 'The machine does not behave as predicted.',
     Verdict.UNDECIDED: 'Nothing could be held against the prediction.',
 }
+
+
+def write_report(
+    comparison: Comparison, out: Path, *, source: str, identification: Sequence[str] = (),
+) -> None:
+    """
+    Write tables, pictures and the report of a comparison into a directory.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What was found.
+    out : Path
+        The directory, which has to exist.
+    source : str
+        Which log was read.
+    identification : sequence of str
+        What identification says.
+
+    """
+    with (out / 'comparison.csv').open('w', encoding='utf-8', newline='') as stream:
+        writer = csv.writer(stream, lineterminator='\n')
+        writer.writerow(HEADER)
+        writer.writerows(rows(comparison))
+    content = {**document(comparison), 'log': source, 'identification': list(identification)}
+    (out / 'comparison.json').write_text(
+        json.dumps(content, indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    pictures = []
+    for name, caption, figure in all_figures(comparison):
+        stream_of = io.BytesIO()
+        figure.savefig(stream_of, dpi=_DPI, format='png')
+        (out / f'{name}.png').write_bytes(stream_of.getvalue())
+        pictures.append((caption, stream_of.getvalue()))
+    (out / 'report.html').write_text(
+        page(comparison, pictures, source=source, identification=identification),
+        encoding='utf-8')
 
 
 def page(

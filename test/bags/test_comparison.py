@@ -200,3 +200,11 @@ def test_every_measured_point_is_weighed_once(answered, fan):
     compared = sum(len(event.stamp_ns) for event in events if isinstance(event, Compared))
     weighed = sum(len(event.rate) for event in events if isinstance(event, Weighed))
     assert compared == weighed > 300
+
+
+def test_the_face_compares_with_whatever_names_the_machine(fan, answered):
+    import rotorsoil_ros as rs
+
+    given = [rs.compare(str(answered)), rs.compare(answered, fan), rs.compare(answered, str(FAN))]
+    assert {found.verdict for found in given} == {rs.Verdict.FAILS}
+    assert given[0].failures == given[1].failures == given[2].failures
