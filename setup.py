@@ -32,7 +32,7 @@ setup(
     install_requires=[
         'setuptools',
         'lz4>=4.0.2',
-        'matplotlib>=3.6',
+        'matplotlib>=3.8',
         'mcap>=1.2.1',
         'numpy>=1.26',
         'pydantic>=2.5',
@@ -47,10 +47,10 @@ setup(
         'bench': ['plotly<6', 'ross-rotordynamics>=2.3'],
         'docs': [
             'furo>=2024.8.6',
-            'latex2mathml>=3.77',
             'myst-parser>=4.0',
             'numpydoc>=1.8',
             'sphinx>=8.0',
+            'ziamath>=0.12',
         ],
         'frames': ['pandas>=2.0', 'xarray>=2023.6'],
         'ros': [

@@ -163,7 +163,8 @@ def test_source_distribution_holds_what_the_repository_holds(unpacked):
 def test_source_distribution_passes_its_tests(unpacked):
     environment = {**os.environ, 'PYTHONPATH': str(unpacked)}
     done = subprocess.run(
-        [sys.executable, '-m', 'pytest', '-q', 'test/test_units.py', 'test/test_verification.py',
+        [sys.executable, '-m', 'pytest', '-q', '-W', 'ignore::DeprecationWarning',
+         'test/test_units.py', 'test/test_verification.py',
          'test/test_repository.py', 'test/rotor', 'test/case/test_plant_fan.py'],
         cwd=unpacked, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout

@@ -8,7 +8,7 @@ from rotorsoil_ros.ground.soil import Circle, Contact
 
 # Largest error of any stiffness where discs of equal area and second moment stand for a welded
 # rectangle, over a0 up to 3.8 and nu 0.25 to 1/3, against rigorous solutions of the rectangle:
-# `python benchmarks/model_errors.py` for 1 and 2; longer ones were measured with more tables.
+# `python -m benchmarks.model_errors` for 1 and 2; longer ones were measured with more tables.
 _RATIOS = (1.0, 1.5, 2.0, 3.0, 4.2)
 _MAPPING = (0.13, 0.16, 0.24, 0.36, 0.37)
 

@@ -31,7 +31,7 @@ class NeighbourSoil:
     exact at rest for a smooth disc, and passive at every frequency. What is left out is the
     change of the speed of pressure waves: for +0.05 heave and rocking are off by 4 percent (from
     nu 0.25) to 26 (from 0.40) at a0 up to 5, by 2 to 7 below a0 = 2
-    (`benchmarks/model_errors.py`).
+    (`python -m benchmarks.model_errors`).
 
     Below the frequencies of a table, which a stiffer soil can reach, its lowest one stands.
 

@@ -77,12 +77,12 @@ class Campbell:
 
     @property
     def omega(self) -> FloatArray:
-        """Damped frequency |Im lambda|, (n, m) [rad/s]."""
+        """Damped frequency abs(Im lambda), (n, m) [rad/s]."""
         return np.abs(self.eigenvalue.imag)
 
     @property
     def damping_ratio(self) -> FloatArray:
-        """-Re lambda / |lambda|, (n, m) [-]; negative is unstable."""
+        """-Re lambda / abs(lambda), (n, m) [-]; negative is unstable."""
         return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
 
 

@@ -125,14 +125,12 @@ def test_unbalance_acts_on_the_next_message_and_the_model_says_so(bench, machine
 
 
 def test_the_unbalance_of_the_case_reaches_the_table_to_the_last_bit(bench, tmp_path):
+    # Through modulus and phase another number may come back, by the last bit.
     case = tmp_path / 'case.yaml'
     case.write_text(Path(bench.case_file).read_text().replace(
         'unbalances:', 'unbalances:\n  - {disc: disc_2, moment: 1.1e-5, phase: 0.2}'))
     node = bench.active('fan', fan__case=str(case))
     expected = load(case).unbalance
-    moment, phase = abs(expected[1]), np.angle(expected[1])
-    # Why it matters: through modulus and phase another number comes back.
-    assert complex(moment * math.cos(phase), moment * math.sin(phase)) != expected[1]
     assert node.settings.unbalance('fan', ('disc_1', 'disc_2')).tobytes() == expected.tobytes()
 
 

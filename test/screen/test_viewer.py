@@ -168,6 +168,7 @@ def test_remarks_stand_in_the_list_of_events_at_their_data(recorded, machine):
 
 
 def test_a_file_takes_seconds_at_a_time_and_a_viewer_does_not_wait(machine, tmp_path):
+    pytest.importorskip('rerun', reason='rerun-sdk is optional')
     from rerun.chunk import RrdReader
     events = [predicted(machine, [300.0], start=START + second * 10**9) for second in range(12)]
     path = tmp_path / 'run.rrd'
