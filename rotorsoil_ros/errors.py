@@ -1,5 +1,8 @@
 """What can go wrong, in four words."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class RotorSoilError(ValueError):
     """Anything that this package refuses to do."""
@@ -15,6 +18,28 @@ class OutOfTableError(RotorSoilError):
 
 class NotSolvedError(RotorSoilError):
     """A system that is singular or a refinement that did not reach its tolerance."""
+
+
+@contextmanager
+def solved(what: str) -> Iterator[None]:
+    """Turn what numpy and scipy raise where numbers do not fit into an error of this package."""
+    import numpy as np  # not above: a command that only tells its options needs none
+
+    try:
+        yield
+    except RotorSoilError:
+        raise
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        raise NotSolvedError(f'{what} cannot be computed: {error}') from error
+    except MemoryError as error:
+        raise NotSolvedError(f'{what} cannot be computed: it needs too much memory, '
+                             f'{error or "more than there is"}') from error
+    except ValueError as error:
+        # The words of scipy for numbers that have overflown.
+        if 'infs or NaNs' not in str(error):
+            raise
+        raise NotSolvedError(f'{what} cannot be computed: a number is too large or too small') \
+            from error
 
 
 def require(holds: bool, name: str, rule: str, value: float) -> None:

@@ -23,6 +23,7 @@ from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.band import SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.response import bytes_needed
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.units import rpm_to_rad_s
 
@@ -87,6 +88,14 @@ class Case:
         document.override(content, overrides)
         return case_of(self.path, content, files=self.files)
 
+
+# What a machine may take: nodes of its mesh, and its response table.
+_MOST_NODES = 2000
+_GIB = 1 << 30
+_LARGEST_TABLE = 2 * _GIB
+
+# Surface speed at which rho v^2 of steel is a twelfth of its modulus [m/s].
+_BURSTING = 1500.0
 
 # Blocks that touch do not overlap.
 _ROUND_OFF = 1e-9
@@ -175,7 +184,9 @@ class _Builder:
         self.faults.refuse_repeated_names()
         self._refuse_unfit_support()
         speed_range = self._speed_range()
+        self._refuse_endless_mesh()
         rotor = RotorEntries(self.faults).rotor()
+        self._refuse_bursting_speed(rotor)
         unbalances = Unbalances(self.faults, rotor)
         case = Case(
             name=entries.name, path=self.faults.path, soil=soil, support=entries.support,
@@ -184,10 +195,39 @@ class _Builder:
             tables=self._tables(speed_range), uncertainty=self._uncertainty(),
             zones=self._zones(), content=self.content, files=self.files)
         with self.faults.at('rotor', entry=entries.rotor):
-            CoupledModel(rotor, case.foundations, [RigidSoil() for _ in case.foundations])
+            self._refuse_size(CoupledModel(
+                rotor, case.foundations, [RigidSoil() for _ in case.foundations], case.couples))
         self._refuse_overlap(case.foundations)
         self._refuse_unreachable_soil(case)
         return case
+
+    def _refuse_endless_mesh(self) -> None:
+        """Raise an InputError before a mesh is built that nobody could solve."""
+        rotor = self.faults.entries.rotor
+        nodes = 1 + sum(section.elements for section in rotor.shaft) + len(rotor.discs) + len(
+            rotor.bearings) + len(rotor.probes)
+        if nodes > _MOST_NODES:
+            raise self.faults.error('rotor', 'shaft', problem=(
+                f'must have at most {_MOST_NODES} nodes with all stations, got {nodes}'))
+
+    def _refuse_bursting_speed(self, rotor: Rotor) -> None:
+        """Raise an InputError at a speed that no shaft of this diameter survives."""
+        widest = max(max(section.outer_diameter) for section in rotor.shaft)
+        highest = self.faults.entries.speed_range_rpm[1]
+        surface = 0.5 * widest * rpm_to_rad_s(highest)
+        if surface > _BURSTING:
+            raise self.faults.error('speed_range_rpm', 1, problem=(
+                f'must turn the shaft, {widest:.4g} m wide, slower than {_BURSTING:g} m/s at its '
+                f'surface, which no material survives, got {highest:g} rpm, {surface:.4g} m/s'))
+
+    def _refuse_size(self, model: CoupledModel) -> None:
+        """Raise an InputError before a table is computed that would fill the memory."""
+        needed = bytes_needed(model)
+        if needed > _LARGEST_TABLE:
+            raise self.faults.error('rotor', 'discs', problem=(
+                f'must be fewer: {len(model.planes)} unbalance planes and {len(model.channels)} '
+                f'motions need a table of {needed / _GIB:.3g} GiB, more than '
+                f'{_LARGEST_TABLE / _GIB:g} GiB, got {len(model.rotor.discs)} discs'))
 
     def _refuse_overlap(self, foundations: tuple[Foundation, ...]) -> None:
         """Raise an InputError at the second of two blocks that stand on the same ground."""

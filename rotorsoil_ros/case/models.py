@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case, infinite_range
-from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.errors import InputError, solved
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import DimensionlessTable
 from rotorsoil_ros.ground.half_space import a0_range, ALGORITHM, InfiniteElementModel
@@ -39,7 +39,9 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
         If infinite elements do not converge.
 
     """
-    return CoupledModel(case.rotor, case.foundations, soil_models(case, directory), case.couples)
+    with solved('the ground under this machine'):
+        soils = soil_models(case, directory)
+    return CoupledModel(case.rotor, case.foundations, soils, case.couples)
 
 
 def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:
@@ -149,7 +151,9 @@ def response_table(case: Case, model: CoupledModel, directory: Path) -> Response
     stored = stored_response_table(case, model, directory)
     if stored is not None:
         return stored
-    table = replace(ResponseTable.build(model, case.speed_range), key=response_key(case, model))
+    with solved('the response of this machine'):
+        table = replace(ResponseTable.build(model, case.speed_range),
+                        key=response_key(case, model))
     Cache(directory).store('response', table.key, table.to_arrays())
     return table
 

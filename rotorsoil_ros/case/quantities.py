@@ -10,6 +10,8 @@ from rotorsoil_ros.case.document import shown
 
 # Larger than any stiffness or speed; products of such numbers still fit into a double.
 _LARGEST_NUMBER = 1e18
+# Below lie denormal numbers, which have no inverse.
+_SMALLEST_NUMBER = 1e-300
 # More elements in one section are a slip of the keyboard and would fill the memory.
 _LARGEST_COUNT = 1000
 _NAME = re.compile(r'[a-z][a-z0-9_]{0,63}')
@@ -27,6 +29,8 @@ def _number_in(unit: str) -> BeforeValidator:
             raise ValueError(f'{rule}, got {value}')
         if abs(value) > _LARGEST_NUMBER:
             raise ValueError(f'{rule} of at most {_LARGEST_NUMBER:g}, got {value:g}')
+        if 0.0 < abs(value) < _SMALLEST_NUMBER:
+            raise ValueError(f'{rule}, 0 or at least {_SMALLEST_NUMBER:g}, got {value:g}')
         return float(value)
 
     return BeforeValidator(validate)

@@ -167,7 +167,8 @@ class ResponseBand:
         edges = np.append(edges[:-1:2], edges[-1])
         return cls((table, *(ResponseTable(
             table.channels, table.planes, table.transmits_force,
-            refine(_solver(model), edges, groups=model.groups, tolerance=_TOLERANCE), _TOLERANCE,
+            refine(_solver(model), edges, groups=model.groups, tolerance=_TOLERANCE,
+                   columns=len(model.planes)), _TOLERANCE,
             table.stability) for model in models)))
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:

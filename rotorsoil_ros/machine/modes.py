@@ -1,7 +1,5 @@
 """The machine's own vibration over speed, and the speeds that are critical."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 import itertools
 import math
@@ -10,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.errors import NotSolvedError, RotorSoilError, solved
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.spectrum import Spectrum, SpectrumSolver
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
@@ -86,16 +84,7 @@ class Campbell:
         return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
 
 
-@contextmanager
-def _solvable() -> Iterator[None]:
-    """Turn what the linear algebra refuses into an error of this package."""
-    try:
-        yield
-    except np.linalg.LinAlgError as error:
-        raise NotSolvedError(f'the modes of this machine cannot be computed: {error}') from error
-
-
-@_solvable()
+@solved('the modes of this machine')
 def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
     """
     Return the lowest modes at each speed.
@@ -199,7 +188,7 @@ class CriticalSpeed:
         return margin + (MARGIN_ABOVE - MARGIN_BELOW if self.speed > running else 0.0)
 
 
-@_solvable()
+@solved('the modes of this machine')
 def critical_speeds(
     model: CoupledModel, speed_range: tuple[float, float],
 ) -> tuple[CriticalSpeed, ...]:

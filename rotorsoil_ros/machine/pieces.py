@@ -20,6 +20,9 @@ _SHORTEST = 1e-9
 # Open pieces at one time: ten resonances of a case need some hundred.
 _MOST_OPEN = 4096
 
+# Complex values that are looked at together: bounds memory, to some 100 MB with all copies.
+_MOST_VALUES = 1 << 20
+
 # Probing columns need only betray a resonance, and only while a piece is long enough to hide it.
 _PROBE_TOLERANCE = 1e-2
 _PROBE_SHORTEST = 1e-4
@@ -161,7 +164,7 @@ def _sum(powers: FloatArray, rows: FloatArray, out: FloatArray | None = None) ->
 
 
 def refine(
-    solve: Solver, edges: FloatArray, *, groups: IntArray, tolerance: float,
+    solve: Solver, edges: FloatArray, *, groups: IntArray, tolerance: float, columns: int,
 ) -> Pieces:
     """
     Halve pieces until polynomials through their nodes are right between the nodes.
@@ -179,6 +182,8 @@ def refine(
         round-off in the others.
     tolerance : float
         Relative to the local magnitude of each value.
+    columns : int
+        p + q, which bounds how many pieces are looked at together.
 
     Returns
     -------
@@ -197,27 +202,42 @@ def refine(
     between = np.vander(along[1::2], DEGREE + 1, increasing=True) @ powers
     left, right, high = edges[:-1], edges[1:], edges[-1]
     done: list[tuple[FloatArray, FloatArray, BoolArray, ComplexArray]] = []
+    most = max(1, _MOST_VALUES // (len(along) * columns * len(groups) or 1))
     while len(left):
         if len(left) > _MOST_OPEN:
             raise NotSolvedError(f'the response is rough everywhere: {len(left)} pieces between '
                                  f'{left.min():g} and {right.max():g} rad/s still miss their '
                                  'tolerance')
-        middle, half = 0.5 * (left + right), 0.5 * (right - left)
-        wanted, probing = (values.reshape(len(left), len(along), *values.shape[1:])
-                           for values in solve((middle[:, None] + half[:, None] * along).ravel()))
-        good = _matches(wanted, between, groups, tolerance)
-        short = right - left <= _SHORTEST * high
-        clear = (_matches(probing, between, groups, _PROBE_TOLERANCE)
-                 | (right - left <= _PROBE_SHORTEST * high))
-        closed = (good & clear) | short
-        coefficients = np.einsum('ij,kj...->ki...', powers, wanted[closed, ::2])
-        done.append((left[closed], right[closed], good[closed], coefficients))
-        left, right = (np.concatenate(ends) for ends in (
-            (left[~closed], middle[~closed]), (middle[~closed], right[~closed])))
+        halved = []
+        for start in range(0, len(left), most):
+            part = slice(start, start + most)
+            closed, good, values = _look(solve, left[part], right[part], along, between,
+                                         groups=groups, tolerance=tolerance, high=high)
+            coefficients = np.einsum('ij,kj...->ki...', powers, values[closed, ::2])
+            done.append((left[part][closed], right[part][closed], good[closed], coefficients))
+            halved.append((left[part][~closed], right[part][~closed]))
+        lefts, rights = (np.concatenate(ends) for ends in zip(*halved, strict=True))
+        middle = 0.5 * (lefts + rights)
+        left, right = np.concatenate([lefts, middle]), np.concatenate([middle, rights])
     lefts, rights, resolved, coefficients = (
         np.concatenate(parts) for parts in zip(*done, strict=True))
     order = np.argsort(lefts)
     return Pieces(np.append(lefts[order], rights.max()), resolved[order], coefficients[order])
+
+
+def _look(
+    solve: Solver, left: FloatArray, right: FloatArray, along: FloatArray, between: FloatArray, *,
+    groups: IntArray, tolerance: float, high: float,
+) -> tuple[BoolArray, BoolArray, ComplexArray]:
+    """Return which pieces need no halving, which of them are right, and their values."""
+    middle, half = 0.5 * (left + right), 0.5 * (right - left)
+    wanted, probing = (values.reshape(len(left), len(along), *values.shape[1:])
+                       for values in solve((middle[:, None] + half[:, None] * along).ravel()))
+    good = _matches(wanted, between, groups, tolerance)
+    short = right - left <= _SHORTEST * high
+    clear = (_matches(probing, between, groups, _PROBE_TOLERANCE)
+             | (right - left <= _PROBE_SHORTEST * high))
+    return np.asarray((good & clear) | short), good, wanted
 
 
 def _matches(

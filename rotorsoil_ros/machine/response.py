@@ -30,6 +30,15 @@ _BLOCK = 16384
 _CHECKS = 200
 
 
+# Pieces that a machine with some resonances ends with.
+_USUAL_PIECES = 100
+
+
+def bytes_needed(model: CoupledModel) -> int:
+    """Return what the response table of a machine takes, roughly [bytes]."""
+    return 16 * _USUAL_PIECES * (DEGREE + 1) * len(model.planes) * len(model.groups)
+
+
 @dataclass(frozen=True)
 class ResponseTable:
     """
@@ -115,7 +124,8 @@ class ResponseTable:
         for left, right in _stable_ranges(growth, low, high):
             first = np.unique(np.append(np.linspace(low, high, _FIRST_PIECES + 1), [left, right]))
             edges = first[(first >= left) & (first <= right)]
-            parts.append(refine(solve, edges, groups=model.groups, tolerance=tolerance))
+            parts.append(refine(solve, edges, groups=model.groups, tolerance=tolerance,
+                                columns=3 * planes))
         pieces = Pieces.joined(parts, (low, high))
         if len(parts) > 1 and not np.any(pieces.resolved):
             raise NotSolvedError('no part of the speed range could be interpolated')

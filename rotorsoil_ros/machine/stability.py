@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.errors import NotSolvedError, solved
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.feeding import fastest, Feed, feeds, highest_fed, knots
 from rotorsoil_ros.machine.mode_names import ModeNames
@@ -173,12 +173,10 @@ def stability(model: CoupledModel, span: tuple[float, float]) -> Stability:
         return Stability((low, high), (), 0.0)
     # Nothing vibrates faster than the mesh: a damper that takes nothing sets no other bound.
     wanted = min(_ABOVE * bound, fastest(model))
-    try:
+    with solved('stability of this machine'):
         pencil = Pencil.up_to(model, wanted)
         samples = _followed(pencil, _first(model, (low, high)))
         found = list(_instabilities(pencil, samples))
-    except np.linalg.LinAlgError as error:
-        raise NotSolvedError(f'stability of this machine cannot be computed: {error}') from error
     known = pencil.solver.span[1]
     return Stability((low, high), tuple(sorted(found, key=lambda one: (one.low, one.frequency))),
                      min(wanted, known), known if known < wanted / _ABOVE else math.inf)

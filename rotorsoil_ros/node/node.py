@@ -11,7 +11,9 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import (
@@ -20,7 +22,7 @@ from rclpy.lifecycle import (
     LifecycleState,
     TransitionCallbackReturn,
 )
-from rclpy.logging import get_logger
+from rclpy.logging import get_logger, LoggingSeverity, set_logger_level
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -239,14 +241,31 @@ class Stop:
             raise KeyboardInterrupt
 
 
+@contextmanager
+def _refused_by_ros() -> Iterator[None]:
+    """Turn what rclpy says of its arguments into one line for a user."""
+    set_logger_level('rcl', LoggingSeverity.FATAL)  # it would say the half of it first
+    try:
+        yield
+    except UnknownROSArgsError as error:
+        raise InputError(f'arguments after --ros-args must be known, got {error}') from error
+    except (RCLError, NameValidationException, ParameterException) as error:
+        # What follows a file of the library is for its authors.
+        said = ' '.join(str(error).split()).partition(', at /')[0]
+        raise InputError(said.removeprefix('failed to initialize rcl: ')) from error
+    finally:
+        set_logger_level('rcl', LoggingSeverity.UNSET)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return 0, or 2 where it could not start."""
     stop = Stop()
     with ExitStack() as stack:
         try:
-            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-            stack.callback(rclpy.try_shutdown)
-            node = RotorsoilNode()
+            with _refused_by_ros():
+                rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+                stack.callback(rclpy.try_shutdown)
+                node = RotorsoilNode()
             stack.callback(node.destroy_node)
             executor = EXECUTORS[node.settings.value('executor')]()
             stack.callback(executor.shutdown)

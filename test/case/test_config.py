@@ -208,3 +208,21 @@ def test_blocks_that_touch_stand_and_are_remarked_with_their_coupling():
     # Two squares 0.25 half-widths apart at a0 = 2: 0.45 (tables of rigid contacts).
     assert told[0].startswith('kb: stands 0 m beside ka; each is taken as alone on the ground')
     assert 'by up to 45%' in told[0]
+
+
+@pytest.mark.parametrize('setting, told', [
+    ('speed_range_rpm.1=1e7', r'speed_range_rpm\.1: must turn the shaft, 0\.02002 m wide, slower '
+                              r'than 1500 m/s .* got 1e\+07 rpm'),
+    ('rotor.shaft.0.length=1e-310', r'rotor\.shaft\.0\.length: must be a finite number in m, 0 or '
+                                    r'at least 1e-300, got 1e-310'),
+    ('soil.shear_modulus=5e-324', r'soil\.shear_modulus: must be a finite number in Pa, 0 or'),
+    ('rotor.shaft=[' + ', '.join(['{length: 0.2, outer_diameter: 0.02, elements: 900}'] * 3) + ']',
+     r'rotor\.shaft: must have at most 2000 nodes with all stations, got 2705'),
+    ('rotor.discs=[' + ', '.join(f'{{name: d{i}, position: {i / 1400}, mass: 1, '
+                                 'diametral_inertia: 1, polar_inertia: 1}'
+                                 for i in range(1000)) + ']',
+     r'rotor\.discs: must be fewer: 1000 unbalance planes and 2\d\d\d motions need a table of '
+     r'24\.2 GiB, more than 2 GiB, got 1000 discs')])
+def test_what_would_fill_the_memory_is_refused_before_it_starts(setting, told):
+    with pytest.raises(InputError, match=told):
+        load(PAPER, ['unbalances=[]', setting])

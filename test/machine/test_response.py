@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
+from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError, solved
 from rotorsoil_ros.ground.soil import RigidSoil
+from rotorsoil_ros.machine import pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.rotor.disc import Disc
@@ -204,3 +205,27 @@ def test_rotor_without_discs_answers_nothing_to_no_unbalance():
 def test_response_that_is_nothing_but_round_off_is_refused_in_finite_time():
     with pytest.raises(NotSolvedError, match='rough everywhere'):
         ResponseTable.build(paper_machine(stiffness=1e18), RANGE)
+
+
+def test_pieces_are_the_same_however_many_are_looked_at_together(machine, table, monkeypatch):
+    monkeypatch.setattr(pieces, '_MOST_VALUES', 20_000)
+    again = ResponseTable.build(machine, RANGE)
+    np.testing.assert_array_equal(again.pieces.edges, table.pieces.edges)
+    np.testing.assert_array_equal(again.pieces.resolved, table.pieces.resolved)
+
+
+@pytest.mark.parametrize('raised, says', [
+    (np.linalg.LinAlgError('Singular matrix'), 'the modes cannot be computed: Singular matrix'),
+    (ValueError('array must not contain infs or NaNs'), 'a number is too large or too small'),
+    (MemoryError('Unable to allocate 43.2 GiB'), 'it needs too much memory, Unable to allocate'),
+    (FloatingPointError('overflow'), 'the modes cannot be computed: overflow')])
+def test_what_numpy_and_scipy_raise_becomes_an_error_of_this_package(raised, says):
+    with pytest.raises(NotSolvedError, match=says), solved('the modes'):
+        raise raised
+
+
+def test_a_slip_of_this_package_stays_one():
+    with pytest.raises(ValueError, match='no such thing'), solved('the modes'):
+        raise ValueError('no such thing')
+    with pytest.raises(OutOfTableError), solved('the modes'):
+        raise OutOfTableError('beyond')

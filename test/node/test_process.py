@@ -2,6 +2,8 @@
 
 from contextlib import suppress
 import signal
+import subprocess
+import sys
 
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
@@ -46,6 +48,21 @@ def test_bad_input_ends_the_process_with_2_and_one_line(start, parameter, compla
     assert process.wait(DEADLINE_S) == 2
     assert len(told) == 1
     assert complaint in told[0]
+
+
+@pytest.mark.parametrize('arguments, complaint', [
+    (['--params-file', '/nowhere.yaml'], "Couldn't parse params file: '--params-file /nowhere"),
+    (['-p', 'foo'], "Couldn't parse parameter override rule: '-p foo'"),
+    (['-r', 'foo'], "Couldn't parse remap rule: '-r foo'"),
+    (['--log-level', 'loud'], "Couldn't parse log level: '--log-level loud'"),
+    (['--foo'], "arguments after --ros-args must be known, got ['--foo']")])
+def test_arguments_that_ros_does_not_know_end_it_with_2_and_one_line(arguments, complaint):
+    done = subprocess.run(
+        [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args', *arguments],
+        capture_output=True, text=True, timeout=DEADLINE_S)
+    assert done.returncode == 2
+    (line,) = (done.stdout + done.stderr).splitlines()
+    assert complaint in line
 
 
 def test_a_kill_loses_nothing_that_was_on_the_disk_and_the_next_start_saves_it(
