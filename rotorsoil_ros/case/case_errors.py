@@ -1,15 +1,20 @@
 """Where in a case file a fault lies, and how it is told in one line."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 import re
+from typing import TypeVar
 
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.schema import Place
 from rotorsoil_ros.errors import InputError, RotorSoilError
+
+T = TypeVar('T')
+E = TypeVar('E')
 
 
 def message(path: Path, place: Place, problem: str) -> str:
@@ -30,11 +35,37 @@ class Faults:
         The file.
     entries : schema.Document
         What it says.
+    found : list of str
+        Faults that were met so far, a line each.
 
     """
 
     path: Path
     entries: schema.Document
+    found: list[str] = field(default_factory=list)
+
+    def attempt(self, build: Callable[[], T]) -> T | None:
+        """Return what is built, or keep what is wrong with it for later, and return None."""
+        try:
+            return build()
+        except InputError as error:
+            self.found.append(str(error))
+            return None
+
+    def attempt_each(
+        self, build: Callable[[int, E], T], entries: Iterable[E],
+    ) -> tuple[T, ...] | None:
+        """Return what is built of every entry, or None if one is at fault."""
+        before = len(self.found)
+        built = [self.attempt(partial(build, index, entry))
+                 for index, entry in enumerate(entries)]
+        return tuple(one for one in built if one is not None) if (
+            len(self.found) == before) else None
+
+    def tell(self) -> None:
+        """Raise an InputError with every fault that was found, a line each."""
+        if self.found:
+            raise InputError('\n'.join(dict.fromkeys(self.found)))
 
     @contextmanager
     def at(self, *place: int | str, entry: schema.Entry | None = None) -> Iterator[None]:

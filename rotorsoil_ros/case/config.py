@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,14 @@ from pydantic import ValidationError
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case import document, schema, stiffness_file
+from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, message
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
-from rotorsoil_ros.errors import InputError, RotorSoilError
-from rotorsoil_ros.ground.accuracy import gap
+from rotorsoil_ros.errors import InputError, require, RotorSoilError
 from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import a0_range
-from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle, RigidSoil, Soil
+from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.band import SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -97,9 +98,6 @@ _LARGEST_TABLE = 2 * _GIB
 # Surface speed at which rho v^2 of steel is a twelfth of its modulus [m/s].
 _BURSTING = 1500.0
 
-# Blocks that touch do not overlap.
-_ROUND_OFF = 1e-9
-
 # Natural modes above the running speed and excitation at twice the speed need the soil too.
 _HIGHEST_ORDER = 2.0
 
@@ -164,8 +162,8 @@ def case_of(
     try:
         entries = schema.Document.model_validate(content)
     except ValidationError as error:
-        place, problem = schema.first_fault(error)
-        raise InputError(message(path, place, problem)) from error
+        raise InputError('\n'.join(
+            message(path, place, problem) for place, problem in schema.faults(error))) from error
     return _Builder(Faults(path, entries), content, dict(files or {})).case()
 
 
@@ -178,37 +176,50 @@ class _Builder:
     files: dict[str, str]
 
     def case(self) -> Case:
-        entries = self.faults.entries
-        with self.faults.at('soil', entry=entries.soil):
-            soil = None if entries.soil is None else Soil(**dict(entries.soil))
-        self.faults.refuse_repeated_names()
-        self._refuse_unfit_support()
-        speed_range = self._speed_range()
-        self._refuse_endless_mesh()
-        rotor = RotorEntries(self.faults).rotor()
-        self._refuse_bursting_speed(rotor)
-        unbalances = Unbalances(self.faults, rotor)
+        """Return the machine, or raise one InputError with all that is wrong with it."""
+        faults, entries = self.faults, self.faults.entries
+        soil = faults.attempt(self._soil)
+        faults.attempt(faults.refuse_repeated_names)
+        faults.attempt(self._refuse_unfit_support)
+        speed_range = faults.attempt(self._speed_range)
+        # A mesh that nobody could solve is not even built.
+        rotor = RotorEntries(faults).rotor() if faults.attempt(self._mesh) else None
+        if rotor is not None:
+            faults.attempt(lambda: self._refuse_bursting_speed(rotor))
+        foundations = BlockEntries(faults).foundations()
+        unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
+        unbalance = unbalances.total()
+        tables = None if speed_range is None else faults.attempt(
+            lambda: self._tables(speed_range))
+        uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
+        faults.tell()
+        assert rotor is not None
+        assert foundations is not None
+        assert unbalance is not None
+        assert speed_range is not None
+        assert tables is not None
+        assert uncertainty is not None
+        assert zones is not None
         case = Case(
-            name=entries.name, path=self.faults.path, soil=soil, support=entries.support,
-            foundations=self._foundations(rotor), rotor=rotor, unbalance=unbalances.total(),
-            couples=unbalances.couples(), speed_range=speed_range,
-            tables=self._tables(speed_range), uncertainty=self._uncertainty(),
-            zones=self._zones(), content=self.content, files=self.files)
-        with self.faults.at('rotor', entry=entries.rotor):
+            name=entries.name, path=faults.path, soil=soil, support=entries.support,
+            foundations=foundations, rotor=rotor, unbalance=unbalance,
+            couples=unbalances.couples(), speed_range=speed_range, tables=tables,
+            uncertainty=uncertainty, zones=zones, content=self.content, files=self.files)
+        with faults.at('rotor', entry=entries.rotor):
             self._refuse_size(CoupledModel(
                 rotor, case.foundations, [RigidSoil() for _ in case.foundations], case.couples))
-        self._refuse_overlap(case.foundations)
         self._refuse_unreachable_soil(case)
         return case
 
-    def _refuse_endless_mesh(self) -> None:
-        """Raise an InputError before a mesh is built that nobody could solve."""
+    def _mesh(self) -> int:
+        """Return the number of nodes, or raise an InputError if nobody could solve so many."""
         rotor = self.faults.entries.rotor
         nodes = 1 + sum(section.elements for section in rotor.shaft) + len(rotor.discs) + len(
             rotor.bearings) + len(rotor.probes)
         if nodes > _MOST_NODES:
             raise self.faults.error('rotor', 'shaft', problem=(
                 f'must have at most {_MOST_NODES} nodes with all stations, got {nodes}'))
+        return nodes
 
     def _refuse_bursting_speed(self, rotor: Rotor) -> None:
         """Raise an InputError at a speed that no shaft of this diameter survives."""
@@ -229,17 +240,21 @@ class _Builder:
                 f'motions need a table of {needed / _GIB:.3g} GiB, more than '
                 f'{_LARGEST_TABLE / _GIB:g} GiB, got {len(model.rotor.discs)} discs'))
 
-    def _refuse_overlap(self, foundations: tuple[Foundation, ...]) -> None:
-        """Raise an InputError at the second of two blocks that stand on the same ground."""
-        for second, block in enumerate(foundations):
-            for first, other in enumerate(foundations[:second]):
-                apart = abs(block.centre_y - other.centre_y)
-                clear = gap(block.contact, other.contact, distance=apart)
-                if clear < -_ROUND_OFF * apart:
-                    raise self.faults.error(
-                        'foundations', second, problem=f'{block.name} must not overlap '
-                        f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap along '
-                        f'y: centres are {apart:.4g} m apart')
+    def _soil(self) -> Soil | None:
+        entry = self.faults.entries.soil
+        if entry is None:
+            return None
+        given = {key: value for key, value in dict(entry).items() if value is not None}
+        velocity = given.pop('shear_wave_velocity', None)
+        if (velocity is None) is (entry.shear_modulus is None):
+            raise self.faults.error(
+                'soil', problem='needs either shear_modulus in Pa or shear_wave_velocity in m/s, '
+                                f'got {"neither" if velocity is None else "both"}')
+        with self.faults.at('soil', entry=entry):
+            if velocity is not None:
+                require(0.0 < velocity < math.inf, 'shear_wave_velocity', '> 0 m/s', velocity)
+                given['shear_modulus'] = entry.density * velocity**2
+            return Soil(**given)
 
     def _refuse_unfit_support(self) -> None:
         entries, support = self.faults.entries, self.faults.entries.support
@@ -296,32 +311,6 @@ class _Builder:
         for index, foundation in enumerate(case.foundations):
             with self.faults.at('foundations', index):
                 infinite_range(case.soil, foundation.contact, geometry, case.speed_range)
-
-    def _foundations(self, rotor: Rotor) -> tuple[Foundation, ...]:
-        foundations = []
-        for index, entry in enumerate(self.faults.entries.foundations):
-            seats = [bearing.position for bearing in rotor.bearings
-                     if bearing.foundation == entry.name]
-            if not seats:
-                raise self.faults.error('foundations', index, problem=f'no bearing stands on '
-                                                                f'{entry.name}')
-            with self.faults.at('foundations', index, entry=entry):
-                centre_y = entry.centre_y
-                foundations.append(Foundation(
-                    name=entry.name, contact=self._contact(index, entry), mass=entry.mass,
-                    centre_y=0.5 * (min(seats) + max(seats)) if centre_y is None else centre_y,
-                    centre_of_gravity_height=entry.centre_of_gravity_height,
-                    inertia=entry.inertia, height=entry.height))
-        return tuple(foundations)
-
-    def _contact(self, index: int, entry: schema.Foundation) -> Contact:
-        width, length, radius = entry.half_width, entry.half_length, entry.radius
-        if radius is not None and width is None and length is None:
-            return Circle(radius)
-        if radius is None and width is not None and length is not None:
-            return Rectangle(width, length)
-        raise self.faults.error('foundations', index, problem='needs either half_width and '
-                                                              'half_length or radius, in m')
 
     def _uncertainty(self) -> SoilSpread:
         entry = self.faults.entries.uncertainty

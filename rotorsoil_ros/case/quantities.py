@@ -1,12 +1,17 @@
 """In which unit a value of a case file is, and which values are refused at once."""
 
+from functools import cache
 import math
 import re
-from typing import Annotated
+import tokenize
+from typing import Annotated, TYPE_CHECKING
 
 from pydantic import BeforeValidator
 
 from rotorsoil_ros.case.document import shown
+
+if TYPE_CHECKING:
+    import pint
 
 # Larger than any stiffness or speed; products of such numbers still fit into a double.
 _LARGEST_NUMBER = 1e18
@@ -15,14 +20,20 @@ _SMALLEST_NUMBER = 1e-300
 # More elements in one section are a slip of the keyboard and would fill the memory.
 _LARGEST_COUNT = 1000
 _NAME = re.compile(r'[a-z][a-z0-9_]{0,63}')
+# A number and what can be a unit: nothing that a parser would have to compute for long.
+_WITH_UNIT = re.compile(
+    r'([-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?:[eE][-+]?[0-9]{1,3})?)\s*'
+    r'((?:[A-Za-zµμ°%Ω]+(?:\^[-+]?[0-9])?[ */·]{0,2}){1,6})')
 _GRADE = re.compile(r'[Gg] ?([0-9]{1,5}(?:\.[0-9]{1,5})?)')
 
 
 def _number_in(unit: str) -> BeforeValidator:
-    """Return a validator that takes finite numbers only: no text, no truth value."""
+    """Return a validator that takes finite numbers, or text of a number and its unit."""
     rule = f'must be a finite number{unit and f" in {unit}"}'
 
     def validate(value: object) -> float:
+        if isinstance(value, str) and (found := _WITH_UNIT.fullmatch(value.strip())):
+            value = _converted(float(found[1]), found[2], unit, rule)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError(f'{rule}, got {shown(value)}')
         if not math.isfinite(value):
@@ -34,6 +45,38 @@ def _number_in(unit: str) -> BeforeValidator:
         return float(value)
 
     return BeforeValidator(validate)
+
+
+def _converted(number: float, given: str, unit: str, rule: str) -> float:
+    """Return a number in another unit in the unit of its key."""
+    import pint  # a quarter of a second, for who writes units only
+
+    said = f'{number:g} {given}'
+    try:
+        registry = _registry()
+        return float(registry.Quantity(number, given).to(_spelled(unit)).magnitude)
+    except pint.UndefinedUnitError as error:
+        raise ValueError(f'{rule}, got {shown(said)}, a unit that is not known') from error
+    except pint.DimensionalityError as error:
+        raise ValueError(f'{rule}, got {shown(said)}, which is none of that') from error
+    except (pint.errors.PintError, tokenize.TokenError, ValueError, TypeError, ArithmeticError,
+            SyntaxError, AttributeError) as error:
+        raise ValueError(f'{rule}, got {shown(said)}') from error
+
+
+@cache
+def _registry() -> 'pint.UnitRegistry[float]':
+    import pint
+
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry(cache_folder=None)
+    # Here only turns come per second: 16.5 Hz of a rotor are 990 rpm.
+    registry.define('hertz = turn / second = Hz')
+    return registry
+
+
+def _spelled(unit: str) -> str:
+    """Return a unit of a case file as pint spells it."""
+    return unit.replace(' ', '*') or 'dimensionless'
 
 
 def _name(value: object) -> str:

@@ -18,6 +18,12 @@ from rotorsoil_ros.rotor.disc import Disc, permissible_unbalance
 from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 from rotorsoil_ros.units import rpm_to_rad_s
 
+# What a case may call by its name. EN 1993-1-1 (steel), EN 10088-1 (1.4301), EN 1561 (GJL-250),
+# EN 1999-1-1 (aluminium): E [Pa], nu [-], rho [kg/m^3].
+MATERIALS = {
+    'steel': Material(2.1e11, 0.3, 7850.0), 'stainless_steel': Material(2.0e11, 0.3, 7900.0),
+    'cast_iron': Material(1.08e11, 0.26, 7200.0), 'aluminium': Material(7.0e10, 0.3, 2700.0),
+}
 _INERTIAS = ('mass', 'diametral_inertia', 'polar_inertia')
 _DIMENSIONS = ('outer_diameter', 'inner_diameter', 'width', 'density')
 
@@ -28,12 +34,21 @@ class RotorEntries:
 
     faults: Faults
 
-    def rotor(self) -> Rotor:
-        """Return shaft, discs, bearings and probes."""
+    def rotor(self) -> Rotor | None:
+        """Return shaft, discs, bearings and probes, or None where one is at fault."""
+        entries, faults = self.faults.entries.rotor, self.faults
+        shaft = faults.attempt_each(self._section, entries.shaft)
+        discs = faults.attempt_each(self._disc, entries.discs)
+        bearings = faults.attempt_each(self._bearing, entries.bearings)
+        if shaft is None or discs is None or bearings is None:
+            return None
+        return faults.attempt(lambda: self._assembled(shaft, discs, bearings))
+
+    def _assembled(
+        self, shaft: tuple[ShaftSection, ...], discs: tuple[Disc, ...],
+        bearings: tuple[Bearing, ...],
+    ) -> Rotor:
         entries = self.faults.entries.rotor
-        shaft = tuple(self._section(i, entry) for i, entry in enumerate(entries.shaft))
-        discs = tuple(self._disc(i, entry) for i, entry in enumerate(entries.discs))
-        bearings = tuple(self._bearing(i, entry) for i, entry in enumerate(entries.bearings))
         probes = tuple(Probe(entry.name, entry.position) for entry in entries.probes)
         with self.faults.at('rotor', entry=entries):
             return Rotor(shaft_height=entries.shaft_height, shaft=shaft, discs=discs,
@@ -56,6 +71,8 @@ class RotorEntries:
         if chosen is None:
             raise self.faults.error(*place, problem='is missing, and so is that of '
                                                     + '.'.join(map(str, section)))
+        if not isinstance(chosen, schema.Material):
+            return MATERIALS[chosen]
         with self.faults.at(*place, entry=chosen):
             return Material(**dict(chosen))
 
@@ -125,7 +142,7 @@ class RotorEntries:
             raise self.faults.error(*place, problem='must be two or more rising speeds >= 0 rpm, '
                                                     f'got {shown(speed_rpm)}')
         low, high = self.faults.entries.speed_range_rpm
-        if not (speed_rpm[0] <= low and high <= speed_rpm[-1]):
+        if low < high and not (speed_rpm[0] <= low and high <= speed_rpm[-1]):
             raise self.faults.error(
                 *place, problem=f'must cover speed_range_rpm, {low:g} to {high:g} rpm, '
                                 f'got {speed_rpm[0]:g} to {speed_rpm[-1]:g}')
@@ -153,29 +170,35 @@ class Unbalances:
     """Adds up the unbalance of each disc and says at which key it was refused."""
 
     faults: Faults
-    rotor: Rotor
+    mass: float | None
 
     def couples(self) -> tuple[str, ...]:
         """Return the discs that have a couple, in the order of the rotor."""
         named = {entry.disc for entry in self.faults.entries.unbalances
                  if entry.couple is not None}
-        return tuple(disc.name for disc in self.rotor.discs if disc.name in named)
+        return tuple(disc.name for disc in self.faults.entries.rotor.discs if disc.name in named)
 
-    def total(self) -> ComplexArray:
+    def total(self) -> ComplexArray | None:
         """Return moments of all discs [kg m], then of the couples [kg m^2], with their phase."""
-        discs, couples = [disc.name for disc in self.rotor.discs], self.couples()
+        entries = self.faults.entries
+        parts = self.faults.attempt_each(self._vector, entries.unbalances)
+        if parts is None:
+            return None
+        discs, couples = [disc.name for disc in entries.rotor.discs], self.couples()
         total = np.zeros(len(discs) + len(couples), dtype=complex)
-        for index, entry in enumerate(self.faults.entries.unbalances):
-            if entry.disc not in discs:
-                raise self.faults.error(
-                    'unbalances', index, 'disc',
-                    problem=f'must be one of {", ".join(discs)}, got {entry.disc}')
-            total[discs.index(entry.disc)] += (
-                self._moment(index, entry) * np.exp(1j * entry.phase))
+        for vector, entry in zip(parts, entries.unbalances, strict=True):
+            total[discs.index(entry.disc)] += vector
             if entry.couple is not None:
                 plane = len(discs) + couples.index(entry.disc)
                 total[plane] += entry.couple * np.exp(1j * entry.couple_phase)
         return total
+
+    def _vector(self, index: int, entry: schema.Unbalance) -> complex:
+        discs = [disc.name for disc in self.faults.entries.rotor.discs]
+        if entry.disc not in discs:
+            raise self.faults.error('unbalances', index, 'disc',
+                                    problem=f'must be one of {", ".join(discs)}, got {entry.disc}')
+        return complex(self._moment(index, entry) * np.exp(1j * entry.phase))
 
     def _moment(self, index: int, entry: schema.Unbalance) -> float:
         place = ('unbalances', index)
@@ -206,6 +229,8 @@ class Unbalances:
         if not 0.0 < entry.share <= 1.0:
             raise self.faults.error(*place, 'share', problem=f'must be in (0, 1], '
                                                              f'got {entry.share:g}')
+        if self.mass is None:
+            return 0.0  # never used: what is wrong with the rotor has been kept
         with self.faults.at(*place, entry=entry):
             return entry.share * permissible_unbalance(
-                grade=grade, mass=self.rotor.mass, speed=rpm_to_rad_s(rated))
+                grade=grade, mass=self.mass, speed=rpm_to_rad_s(rated))

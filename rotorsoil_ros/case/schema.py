@@ -1,19 +1,20 @@
 """Which keys a case file may have, and of which kind and unit each is."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 import difflib
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Discriminator,
     model_validator,
+    ModelWrapValidatorHandler,
     StringConstraints,
     Tag,
     ValidationError,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.quantities import (
@@ -38,34 +39,63 @@ from rotorsoil_ros.case.quantities import (
 
 # Which of two shapes a value has, where a file may choose; no key can be called so.
 _CONSTANT, _TABLE, _NUMBER, _AXES = '<constant>', '<table>', '<number>', '<axes>'
+_KEYS, _WORD = '<keys>', '<word>'
+_SHAPES = (_CONSTANT, _TABLE, _NUMBER, _AXES, _KEYS, _WORD)
 
 class Entry(BaseModel):
     """One mapping of a case file."""
 
     model_config = ConfigDict(extra='forbid', frozen=True)
 
-    @model_validator(mode='before')
+    @model_validator(mode='wrap')
     @classmethod
-    def _refuse_unknown_keys(cls, value: Any) -> Any:
-        if isinstance(value, dict):
-            for key in value:
-                if key not in cls.model_fields:
-                    raise PydanticCustomError('unknown_key', '{problem}', {
-                        'key': key, 'problem': _unknown(key, list(cls.model_fields))})
-        return value
+    def _refuse_unknown_keys(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Tell every unknown key, beside what is wrong with the others."""
+        unknown = ([key for key in value if key not in cls.model_fields]
+                   if isinstance(value, dict) else [])
+        if not unknown:
+            return handler(value)
+        meant = {key: _meant(key, cls, value) for key in unknown}
+        faults = [InitErrorDetails(
+            type=PydanticCustomError('unknown_key', '{problem}', {
+                'problem': _unknown(key, meant[key], list(cls.model_fields))}),
+            loc=(str(key),), input=value[key]) for key in unknown]
+        try:
+            handler({key: entry for key, entry in value.items() if key not in unknown})
+        except ValidationError as error:
+            # What is missing because it is misspelled is told once.
+            faults += [_again(detail) for detail in error.errors(include_url=False)
+                       if not (detail['type'] == 'missing' and detail['loc'][-1:] in
+                               {(name,) for name in meant.values()})]
+        raise ValidationError.from_exception_data(cls.__name__, faults)
 
 
-def _unknown(key: Hashable, known: list[str]) -> str:
-    near = difflib.get_close_matches(str(key), known, n=1)
-    if near:
-        return f'is not a known key; did you mean {near[0]}?'
+def _meant(key: Hashable, entry: type[Entry], value: Mapping[Hashable, Any]) -> str | None:
+    """Return the key that a wrong one was probably meant to be, one that is not yet there."""
+    near = difflib.get_close_matches(str(key), set(entry.model_fields) - set(value), n=1)
+    return near[0] if near else None
+
+
+def _unknown(key: Hashable, meant: str | None, known: list[str]) -> str:
+    if meant is not None:
+        return f'is not a known key; did you mean {meant}?'
     return f'is not a known key; known here: {", ".join(known)}'
 
 
-class Soil(Entry):
-    """Half-space."""
+def _again(detail: ErrorDetails) -> InitErrorDetails:
+    """Return an error as it has to be raised again."""
+    kind: str | PydanticCustomError = detail['type']
+    context = detail.get('ctx', {})
+    if kind == 'unknown_key':
+        kind, context = PydanticCustomError('unknown_key', '{problem}', context), {}
+    return InitErrorDetails(type=kind, loc=detail['loc'], input=detail['input'], ctx=context)
 
-    shear_modulus: Pascal
+
+class Soil(Entry):
+    """Half-space, by its shear modulus or by the velocity of its shear waves."""
+
+    shear_modulus: Pascal | None = None
+    shear_wave_velocity: MetrePerSecond | None = None
     poisson_ratio: Ratio
     density: KilogramPerCubicMetre
     loss_factor: Ratio
@@ -87,10 +117,11 @@ class Foundation(Entry):
     half_length: Metre | None = None
     radius: Metre | None = None
     centre_y: Metre | None = None
-    mass: Kilogram
-    centre_of_gravity_height: Metre
-    inertia: tuple[KilogramSquareMetre, KilogramSquareMetre, KilogramSquareMetre]
+    mass: Kilogram | None = None
+    centre_of_gravity_height: Metre | None = None
+    inertia: tuple[KilogramSquareMetre, KilogramSquareMetre, KilogramSquareMetre] | None = None
     height: Metre | None = None
+    density: KilogramPerCubicMetre | None = None
     stiffness_file: FileName | None = None
 
 
@@ -102,6 +133,16 @@ class Material(Entry):
     density: KilogramPerCubicMetre
 
 
+def _given_or_named(value: object) -> str:
+    return _WORD if isinstance(value, str) else _KEYS
+
+
+AnyMaterial: TypeAlias = Annotated[
+    Annotated[Material, Tag(_KEYS)] | Annotated[Literal['steel', 'stainless_steel', 'cast_iron',
+                                                        'aluminium'], Tag(_WORD)],
+    Discriminator(_given_or_named)]
+
+
 class Section(Entry):
     """Piece of shaft; a diameter at the right end makes it conical."""
 
@@ -111,7 +152,7 @@ class Section(Entry):
     inner_diameter: Metre = 0.0
     inner_diameter_end: Metre | None = None
     elements: Count
-    material: Material | None = None
+    material: AnyMaterial | None = None
     added_mass: KilogramPerMetre | None = None
 
 
@@ -220,7 +261,7 @@ class Rotor(Entry):
     """What turns."""
 
     shaft_height: Metre
-    material: Material | None = None
+    material: AnyMaterial | None = None
     shaft: list[Section]
     discs: list[Disc] = []
     bearings: list[Bearing]
@@ -292,14 +333,16 @@ _WHAT = {
 Place: TypeAlias = tuple[int | str, ...]
 
 
-def first_fault(error: ValidationError) -> tuple[Place, str]:
-    """Return where a document is at fault first, and what is wrong there, in one line."""
-    detail: ErrorDetails = error.errors(include_url=False)[0]
+def faults(error: ValidationError) -> list[tuple[Place, str]]:
+    """Return where a document is at fault, and what is wrong there, a line each."""
+    return [_fault(detail) for detail in error.errors(include_url=False)]
+
+
+def _fault(detail: ErrorDetails) -> tuple[Place, str]:
     context = detail.get('ctx', {})
-    place = tuple(step for step in detail['loc']
-                  if step not in (_CONSTANT, _TABLE, _NUMBER, _AXES))
+    place = tuple(step for step in detail['loc'] if step not in _SHAPES)
     if detail['type'] == 'unknown_key':
-        return (*place, str(context['key'])), context['problem']
+        return place, context['problem']
     if detail['type'] == 'value_error':
         return place, str(context['error'])
     got = shown(detail['input'])

@@ -36,7 +36,8 @@ class Soil:
     def __post_init__(self) -> None:
         require(0.0 < self.shear_modulus < math.inf, 'shear_modulus', '> 0 Pa and finite',
                 self.shear_modulus)
-        require(0.0 <= self.poisson_ratio < 0.5, 'poisson_ratio', 'in [0, 0.5)',
+        require(0.0 <= self.poisson_ratio < 0.5, 'poisson_ratio',
+                'in [0, 0.5), of undrained (saturated) soil 0.49',
                 self.poisson_ratio)
         require(0.0 < self.density < math.inf, 'density', '> 0 kg/m^3 and finite', self.density)
         require(0.0 <= self.loss_factor < 1.0, 'loss_factor', 'in [0, 1)', self.loss_factor)

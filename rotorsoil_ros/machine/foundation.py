@@ -11,6 +11,15 @@ from rotorsoil_ros.errors import NotSolvedError, require
 from rotorsoil_ros.ground.soil import Contact
 
 
+def solid_inertia(
+    contact: Contact, *, mass: float, height: float,
+) -> tuple[float, float, float]:
+    """Return the inertia of a solid block on its contact, about its centre [kg m^2]."""
+    x, y, z = (mass * moment / contact.area for moment in contact.second_moments)
+    upright = mass * height**2 / 12.0
+    return x + upright, y + upright, z
+
+
 @dataclass(frozen=True, slots=True)
 class Foundation:
     """

@@ -1,0 +1,98 @@
+"""Which blocks the entries of a case file describe, and what follows where they say less."""
+
+from dataclasses import dataclass
+import math
+
+from rotorsoil_ros.case import schema
+from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.errors import require
+from rotorsoil_ros.ground.accuracy import gap
+from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
+from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
+
+# Blocks that touch do not overlap.
+_ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class BlockEntries:
+    """Builds the foundations and says at which key one was refused."""
+
+    faults: Faults
+
+    def foundations(self) -> tuple[Foundation, ...] | None:
+        """Return the blocks, or None where one is at fault."""
+        entries = self.faults.entries.foundations
+        blocks = self.faults.attempt_each(self._foundation, entries)
+        if blocks is None:
+            return None
+        return self.faults.attempt(lambda: self._apart(blocks))
+
+    def _apart(self, blocks: tuple[Foundation, ...]) -> tuple[Foundation, ...]:
+        self._refuse_overlap(blocks)
+        return blocks
+
+    def _refuse_overlap(self, foundations: tuple[Foundation, ...]) -> None:
+        """Raise an InputError at the second of two blocks that stand on the same ground."""
+        for second, block in enumerate(foundations):
+            for first, other in enumerate(foundations[:second]):
+                apart = abs(block.centre_y - other.centre_y)
+                clear = gap(block.contact, other.contact, distance=apart)
+                if clear < -_ROUND_OFF * apart:
+                    raise self.faults.error(
+                        'foundations', second, problem=f'{block.name} must not overlap '
+                        f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap along '
+                        f'y: centres are {apart:.4g} m apart')
+
+    def _foundation(self, index: int, entry: schema.Foundation) -> Foundation:
+        blocks = self.faults.entries.foundations
+        # A bearing that names no block stands on the only one.
+        own = (entry.name, None) if len(blocks) == 1 else (entry.name,)
+        seats = [bearing.position for bearing in self.faults.entries.rotor.bearings
+                 if bearing.foundation in own]
+        if not seats:
+            raise self.faults.error('foundations', index, problem=f'no bearing stands on '
+                                                            f'{entry.name}')
+        with self.faults.at('foundations', index, entry=entry):
+            contact = self._contact(index, entry)
+            mass, centre, inertia = self._body(index, entry, contact)
+            centre_y = entry.centre_y
+            return Foundation(
+                name=entry.name, contact=contact, mass=mass,
+                centre_y=0.5 * (min(seats) + max(seats)) if centre_y is None else centre_y,
+                centre_of_gravity_height=centre, inertia=inertia, height=entry.height)
+
+    def _body(
+        self, index: int, entry: schema.Foundation, contact: Contact,
+    ) -> tuple[float, float, tuple[float, float, float]]:
+        """Return mass, centre of gravity and inertia: given, or those of a solid block."""
+        mass, centre, inertia, height = (
+            entry.mass, entry.centre_of_gravity_height, entry.inertia, entry.height)
+        if (mass is None) is (entry.density is None):
+            both = 'got both' if entry.density is not None else 'and neither is there'
+            raise self.faults.error(
+                'foundations', index, 'mass', problem=f'needs a value in kg, or density in '
+                                                      f'kg/m^3 and height in m, {both}')
+        if mass is not None and centre is not None and inertia is not None:
+            return mass, centre, inertia
+        if height is None:
+            given = {'mass': mass, 'centre_of_gravity_height': centre, 'inertia': inertia}
+            missing = next(key for key, value in given.items() if value is None)
+            raise self.faults.error('foundations', index, missing, problem='is missing, and so is '
+                                                      'height in m, of which it would follow')
+        require(0.0 < height < math.inf, 'height', '> 0 m and finite', height)
+        if mass is None and entry.density is not None:
+            require(0.0 < entry.density < math.inf, 'density', '> 0 kg/m^3', entry.density)
+            mass = entry.density * contact.area * height
+        assert mass is not None
+        return (mass, 0.5 * height if centre is None else centre,
+                solid_inertia(contact, mass=mass, height=height) if inertia is None else inertia)
+
+    def _contact(self, index: int, entry: schema.Foundation) -> Contact:
+        width, length, radius = entry.half_width, entry.half_length, entry.radius
+        if radius is not None and width is None and length is None:
+            return Circle(radius)
+        if radius is None and width is not None and length is not None:
+            return Rectangle(width, length)
+        raise self.faults.error('foundations', index, problem='needs either half_width and '
+                                                              'half_length or radius, in m')
