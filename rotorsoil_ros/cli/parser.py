@@ -244,8 +244,8 @@ def _add_modal_verbs(verbs: _Verbs) -> None:
 
 def _add_import_verbs(verbs: _Verbs) -> None:
     ross = _verb(verbs, 'import-ross', 'bags:import_ross',
-                 'write the case of a rotor that ROSS saved as TOML', case=False)
-    ross.add_argument('rotor', metavar='ROTOR.toml', type=Path, help='what Rotor.save wrote')
+                 'write the case of a rotor that ROSS saved as TOML or JSON', case=False)
+    ross.add_argument('rotor', metavar='ROTOR', type=Path, help='what Rotor.save wrote')
     _add_output(ross, 'CASE.yaml', 'case file to write', default='-')
     ross.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse,
                       help='speed range of the case, A to B (default: what the tables of the '

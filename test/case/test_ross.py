@@ -22,6 +22,7 @@ from rotorsoil_ros.machine.modes import campbell, critical_speeds
 
 from oracles.published import ross_criticals, ross_figures, ROSS_FILES, ross_response
 
+CASES = Path(__file__).parents[1] / 'cases'
 NO_CACHE = Path('no cache is needed on a rigid support')
 
 
@@ -134,8 +135,8 @@ def test_speed_range_may_be_chosen(tmp_path):
      "ShaftElement_Shaft Element 0.L: must be a finite number, got 'x'"),
     ('L = 0.2\n', 'L = nan\n', 'ShaftElement_Shaft Element 0.L: must be a finite number, got nan'),
     ('L = 0.2\n', 'L = -0.2\n', 'rotor.shaft.0.length: must be > 0 m and finite, got -0.2'),
-    ('n = 1\n', 'n = 0\n', 'has no ShaftElement between nodes 1 and 2: the shaft must be '
-                           'continuous'),
+    ('n = 1\n', 'n = 0\n', 'holds 2 shafts, over the nodes 0 to 1 and 2 to 6, with no '
+                           'ShaftElement between; a case has one'),
     ('n = 3\nm = 20.0', 'n = 33\nm = 20.0',
      'DiskElement_Disk 0.n: must be a node of the shaft, 0 to 6, got 33'),
     ('n = 0\n', 'n = -1\n', 'ShaftElement_Shaft Element 0.n: must be the number of a node'),
@@ -171,3 +172,100 @@ def test_other_file_is_told_in_one_line(tmp_path, content, problem):
 def test_missing_file_is_told_in_one_line():
     with pytest.raises(InputError, match=r'^nothing\.toml: cannot be read: No such file'):
         read(Path('nothing.toml'))
+
+
+def imported_case(source, tmp_path):
+    """Bring a file over by the command and return its model."""
+    target = tmp_path / f'{source.stem}.yaml'
+    assert main(['import-ross', str(source), '-o', str(target)]) == 0
+    return models.coupled_model(load(target), NO_CACHE)
+
+
+# `run_modal` of ROSS 3.0.0 at 400 rad/s: damped frequencies [rad/s].
+SPEED_TABLE = [310.5131, 370.5517, 423.0098, 434.7884, 2356.6385, 2713.5835]
+
+
+@pytest.mark.parametrize('name', ['rotor', 'control_frequency'])
+def test_table_over_the_speed_of_ross_3_gives_its_modes(name, tmp_path):
+    model = imported_case(CASES / 'ross3_speed_table' / f'{name}.toml', tmp_path)
+    found = np.sort(campbell(model, np.array([400.0]), 6).omega[0])
+    np.testing.assert_allclose(found, SPEED_TABLE, rtol=2e-7)  # printed digits
+
+
+def test_frequency_of_a_vibration_is_not_silently_taken_for_the_speed(tmp_path, capsys):
+    folder = CASES / 'ross3_speed_table'
+    imported_case(folder / 'rotor.toml', tmp_path)
+    assert 'not carried over: nothing' in capsys.readouterr().err
+    imported_case(folder / 'control_frequency.toml', tmp_path)
+    assert 'BearingElement_DE: its table is over the frequency of the vibration' in (
+        capsys.readouterr().err)
+
+
+@pytest.mark.parametrize('name, problem', [
+    ('coupling', 'CouplingElement_cpl: is a coupling; a case has one shaft'),
+    ('coaxial', 'holds 2 shafts, over the nodes 0 to 10 and 11 to 17'),
+    ('two_axes', 'SealElement_lab.kxx: is a table over speed and frequency')])
+def test_what_a_case_cannot_hold_is_refused_by_its_cause(name, problem, tmp_path, capsys):
+    source = CASES / 'ross_coupling_coaxial_2d' / f'{name}.toml'
+    assert main(['import-ross', str(source), '-o', str(tmp_path / 'case.yaml')]) == 2
+    assert capsys.readouterr().err.startswith(f'{source}: {problem}')
+    assert not (tmp_path / 'case.yaml').exists()
+
+
+def test_two_geared_shafts_are_told_with_their_gears(tmp_path):
+    text = (CASES / 'ross_coupling_coaxial_2d' / 'coaxial.toml').read_text()
+    (tmp_path / 'geared.toml').write_text(text.replace('DiskElement_Disk 0', 'GearElement_g1'))
+    with pytest.raises(InputError, match='with the gears GearElement_g1; a case has one'):
+        read(tmp_path / 'geared.toml')
+
+
+def test_longer_sleeve_has_the_mass_that_ross_gives_it(tmp_path):
+    model = imported_case(CASES / 'ross_sleeve_longer' / 'rotor.toml', tmp_path)
+    assert model.rotor.mass == pytest.approx(39.1134, abs=5e-5)  # ROSS, Rotor.m
+
+
+# Damped frequencies of `run_modal` of ROSS 2.3.0 at 400 rad/s [rad/s].
+LAYERED = [518.1929510764, 541.4812829547, 2118.8623166628, 2411.6153556476, 4537.2525119490,
+           5192.2521536891]
+ONE_SECTION = [518.2715669794, 541.5716316471, 2119.0168194467, 2412.0224829673,
+               4540.4350149538, 5197.0207965414]
+
+
+@pytest.mark.parametrize('kind', ['toml', 'json'])
+def test_touching_layer_of_one_material_is_a_section(kind, tmp_path, capsys):
+    model = imported_case(ROSS_FILES / f'sleeve.{kind}', tmp_path)
+    said = capsys.readouterr().err
+    assert 'ShaftElement_Shaft Element 8: touches the shaft below it' in said
+    assert 'not carried over: nothing' in said
+    assert [section.outer_diameter[0] for section in model.rotor.shaft] == [0.05, 0.09, 0.05]
+    found = np.sort(campbell(model, np.array([400.0]), 6).omega[0])
+    np.testing.assert_allclose(found, ONE_SECTION, rtol=1e-9)
+    # ROSS shears both layers apart, each with a coefficient of its own.
+    np.testing.assert_allclose(found, LAYERED, rtol=1e-3)
+
+
+@pytest.mark.parametrize('old, new', [
+    ('idl = 0.05\n', 'idl = 0.06\n'), ('odl = 0.09\nidr = 0.05\n', 'odl = 0.09\nidr = 0.06\n')])
+def test_layer_that_does_not_touch_stiffens_nothing(old, new, tmp_path, capsys):
+    text = (ROSS_FILES / 'sleeve.toml').read_text()
+    assert old in text
+    (tmp_path / 'loose.toml').write_text(text.replace(old, new, 1))
+    imported_case(tmp_path / 'loose.toml', tmp_path)
+    assert 'Element 8: stiffness and rotary inertia of a second layer' in capsys.readouterr().err
+
+
+def test_damping_of_the_whole_model_is_told(tmp_path, capsys):
+    text = (CASES / 'ross3_speed_table' / 'rotor.toml').read_text()
+    (tmp_path / 'damped.toml').write_text(text.replace('alpha = 0.0', 'alpha = 2.5', 1))
+    imported_case(tmp_path / 'damped.toml', tmp_path)
+    assert 'not carried over: parameters: alpha = 2.5' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('content, problem', [
+    ('[1]', 'must hold elements by their names, got [1]'), ('{', 'is not JSON: Expecting'),
+    ('{"_note": "x"}', 'holds no ShaftElement')])
+def test_bad_json_is_told_in_one_line(content, problem, tmp_path):
+    (tmp_path / 'x.json').write_text(content)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path / 'x.json')
+    assert str(caught.value).startswith(f'{tmp_path / "x.json"}: {problem}')

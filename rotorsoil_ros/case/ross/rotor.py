@@ -1,24 +1,22 @@
 """Which machine a rotor is that ROSS has saved; ROSS itself is not needed."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
-import math
 from pathlib import Path
 import re
 from typing import Any
 
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.case.ross_file import one_line, RossFile, Table
+from rotorsoil_ros.case.ross.file import one_line, RossFile, Table
+from rotorsoil_ros.case.ross.shaft import ShaftReader
 from rotorsoil_ros.units import rad_s_to_rpm
 
 _SPEED_RANGE_RPM = (0.0, 10_000.0)
 _SHAFT_HEIGHT = 1.0
-_SAME = 1e-12
-# What our shaft always has.
-_SHAFT_EFFECTS = ('shear_effects', 'rotary_inertia', 'gyroscopic')
 # Coefficients of a bearing that the plane of the rotor does not feel, or that we do not have.
 _OTHER_COEFFICIENTS = ('kzz', 'czz', 'mxx', 'mxy', 'myx', 'myy', 'mzz')
+# Parameters of a model that tell how it was run, and not what it is.
+_OF_A_RUN = ('min_w', 'max_w', 'rated_w', 'tag')
 _DIRECTIONS = (('xx', 'xx', 1.0), ('xz', 'xy', -1.0), ('zx', 'yx', -1.0), ('zz', 'yy', 1.0))
 
 
@@ -45,7 +43,7 @@ class Imported:
 
 def read(path: Path, speed_range_rpm: tuple[float, float] | None = None) -> Imported:
     """
-    Read a rotor that ROSS saved as TOML.
+    Read a rotor that ROSS saved as TOML or JSON.
 
     Parameters
     ----------
@@ -78,7 +76,7 @@ class _Importer:
     names: set[str] = field(default_factory=set)
 
     def imported(self, speed_range_rpm: tuple[float, float] | None) -> Imported:
-        shaft, nodes = self._shaft()
+        shaft, nodes = ShaftReader(self.file, self.assumed, self.lost).shaft()
         discs = [self._disc(title, table, nodes)
                  for title, table in self.file.of_kind('Disk', 'Gear')]
         discs += self._point_masses(nodes)
@@ -95,80 +93,6 @@ class _Importer:
                       'bearings': bearings},
             'unbalances': [], 'speed_range_rpm': [low, high]}
         return Imported(content, self.assumed, self.lost)
-
-    # The shaft
-
-    def _shaft(self) -> tuple[list[dict[str, Any]], dict[int, float]]:
-        """Return the sections and the place of each node along them."""
-        elements = sorted(self.file.of_kind('ShaftElement'), key=lambda one: self.file.node(*one))
-        if not elements:
-            raise self.file.error('', 'holds no ShaftElement; is it a rotor saved by ROSS?')
-        columns = [list(group) for _, group in
-                   groupby(elements, key=lambda one: self.file.node(*one))]
-        first = self.file.node(*columns[0][0])
-        pieces, nodes, place = [], {first: 0.0}, 0.0
-        for number, column in enumerate(columns, start=first):
-            if self.file.node(*column[0]) != number:
-                raise self.file.error('', f'has no ShaftElement between nodes {number} and '
-                                          f'{number + 1}: the shaft must be continuous')
-            # The shaft itself is innermost; what is shrunk onto it is not.
-            column.sort(key=lambda one: self.file.number(one[0], one[1], 'idl'))
-            piece = self._piece(*column[0])
-            self._carry_layers(piece, column[1:])
-            pieces.append(piece)
-            place += piece['length']
-            nodes[number + 1] = place
-        return list(_merged(pieces)), nodes
-
-    def _piece(self, title: str, table: Table) -> dict[str, Any]:
-        self._note_effects(title, table)
-        outer, inner = (self.file.number(title, table, key) for key in ('odl', 'idl'))
-        ends = (self.file.number(title, table, 'odr', outer),
-                self.file.number(title, table, 'idr', inner))
-        piece: dict[str, Any] = {'length': self.file.number(title, table, 'L'),
-                                 'outer_diameter': outer, 'inner_diameter': inner}
-        if ends != (outer, inner):
-            piece['outer_diameter_end'], piece['inner_diameter_end'] = ends
-        return {**piece, 'elements': 1, 'material': self._material(title, table)}
-
-    def _note_effects(self, title: str, table: Table) -> None:
-        for key in _SHAFT_EFFECTS:
-            if not table.get(key, True):
-                self.lost.append(f'{title}: {key} = false; our shaft always has them')
-        for key in ('axial_force', 'torque', 'alpha', 'beta'):
-            if self.file.number(title, table, key, 0.0) != 0.0:
-                self.lost.append(f'{title}: {key} = {table[key]:g}')
-        method = table.get('shear_method_calc', 'cowper')
-        if method != 'cowper':
-            self.lost.append(f'{title}: shear_method_calc = {shown(method)}; ours is cowper')
-
-    def _carry_layers(self, piece: dict[str, Any], layers: Sequence[tuple[str, Table]]) -> None:
-        """Add further elements between the same nodes as mass."""
-        for title, table in layers:
-            layer = self._piece(title, table)
-            area = 0.25 * math.pi * sum(
-                sign * (left**2 + left * right + right**2) / 3.0 for sign, left, right in (
-                    (1.0, layer['outer_diameter'],
-                     layer.get('outer_diameter_end', layer['outer_diameter'])),
-                    (-1.0, layer['inner_diameter'],
-                     layer.get('inner_diameter_end', layer['inner_diameter']))))
-            mass = area * layer['material']['density']
-            piece['added_mass'] = piece.get('added_mass', 0.0) + mass
-            self.lost.append(f'{title}: stiffness and rotary inertia of a second layer; its mass '
-                             f'is kept as added_mass, {mass:g} kg/m')
-
-    def _material(self, title: str, table: Table) -> dict[str, float]:
-        material = table.get('material')
-        if not isinstance(material, dict):
-            raise self.file.error(f'{title}.material', 'is missing')
-        place = f'{title}.material'
-        young = self.file.number(place, material, 'E')
-        poisson = (self.file.number(place, material, 'Poisson') if 'G_s' not in material
-                   else young / (2.0 * self.file.number(place, material, 'G_s')) - 1.0)
-        return {'young_modulus': young, 'poisson_ratio': poisson,
-                'density': self.file.number(place, material, 'rho')}
-
-    # Discs, point masses and bearings
 
     def _disc(self, title: str, table: Table, nodes: Mapping[int, float]) -> dict[str, Any]:
         if title.startswith('Gear'):
@@ -264,20 +188,22 @@ class _Importer:
         columns = {ours: [sign * value + 0.0 for value in self._column(
                               title, table, f'{letter}{theirs}', unit)]
                    for ours, theirs, sign in _DIRECTIONS}
-        speed = table.get('frequency')
+        newer = self.file.major >= 3 and table.get('frequency') is None
+        axis = 'speed' if newer or table.get('speed') is not None else 'frequency'
         if all(len(set(column)) == 1 for column in columns.values()):
             return {key: column[0] for key, column in columns.items()
                     if key in ('xx', 'zz') or column[0] != 0.0}
-        if speed is None:
-            raise self.file.error(f'{title}.frequency', 'is missing, in rad/s; the coefficients '
-                                                        'are a table')
-        speeds = self.file.numbers(title, table, 'frequency', 'rad/s')
+        if table.get(axis) is None:
+            raise self.file.error(f'{title}.{axis}', 'is missing, in rad/s; the coefficients '
+                                                     'are a table')
+        self._note_axis(title, axis)
+        speeds = self.file.numbers(title, table, axis, 'rad/s')
         count = len(speeds)
         for key, column in columns.items():
             if len(column) == 1:
                 columns[key] = column * count
             elif len(column) != count:
-                raise self.file.error(title, 'must have as many coefficients as frequency, '
+                raise self.file.error(title, f'must have as many coefficients as {axis}, '
                                              f'{count}, got {len(column)}')
         return {'speed_rpm': [rad_s_to_rpm(value) for value in speeds],
                 **{key: column for key, column in columns.items()
@@ -286,12 +212,27 @@ class _Importer:
     def _column(self, title: str, table: Table, key: str, unit: str) -> list[float]:
         if key not in table and key[1:] in ('xy', 'yx'):
             return [0.0]
+        given = table.get(key)
+        if isinstance(given, list) and any(isinstance(row, list) for row in given):
+            raise self.file.error(f'{title}.{key}', 'is a table over speed and frequency; a case '
+                                                    'takes coefficients over the speed alone')
         return self.file.numbers(title, table, key, unit)
+
+    def _note_axis(self, title: str, axis: str) -> None:
+        """Say that a file which knows both axes means another one than the speed."""
+        if axis == 'frequency' and self.file.major >= 3:
+            note = (f'{title}: its table is over the frequency of the vibration; it is taken over '
+                    'the speed, which is the same for unbalance only')
+            if note not in self.lost:
+                self.lost.append(note)
 
     def _note_coefficients(self, title: str, table: Table) -> None:
         for key in _OTHER_COEFFICIENTS:
-            if key in table and any(self.file.numbers(title, table, key, 'SI')):
+            if key in table and any(self._column(title, table, key, 'SI')):
                 self.lost.append(f'{title}: {key} = {shown(table[key])}')
+        if table.get('interpolation', 'pchip') != 'pchip':
+            self.lost.append(f'{title}: interpolation = {shown(table["interpolation"])}; ours is '
+                             'pchip')
         if not re.match(r'(Bearing|Seal)Element', title):
             self.lost.append(f'{title}: its geometry; its coefficients are kept')
 
@@ -309,9 +250,18 @@ class _Importer:
         for title, table in self.file.tables.items():
             known = title.startswith(('ShaftElement', 'Disk', 'Gear', 'PointMass'))
             carried = isinstance(table, dict) and 'n' in table and (known or 'kxx' in table)
-            if title == 'ross_version' or carried or not table:
+            if title in ('ross_version', '_note') or carried or not table:
+                continue
+            if title == 'parameters' and isinstance(table, dict):
+                self._note_parameters(table)
                 continue
             self.lost.append(f'{one_line(title)}: is not known here')
+
+    def _note_parameters(self, table: Table) -> None:
+        """Note what holds for the whole model, where it is not nothing."""
+        for key, value in table.items():
+            if value and key not in _OF_A_RUN:
+                self.lost.append(f'parameters: {one_line(key)} = {shown(value)}')
 
     def _place(self, title: str, table: Table, nodes: Mapping[int, float]) -> float:
         node = self.file.node(title, table)
@@ -334,27 +284,3 @@ def _name(text: str, taken: set[str]) -> str:
         name, number = f'{plain}_{number}', number + 1
     taken.add(name)
     return name
-
-
-def _merged(pieces: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield sections: equal cylindrical pieces that follow one another become one."""
-    section: dict[str, Any] | None = None
-    for piece in pieces:
-        if section is not None and _alike(section, piece):
-            section['length'] += piece['length']
-            section['elements'] += 1
-            continue
-        if section is not None:
-            yield section
-        section = dict(piece)
-    if section is not None:
-        yield section
-
-
-def _alike(section: Mapping[str, Any], piece: Mapping[str, Any]) -> bool:
-    if 'outer_diameter_end' in section or 'outer_diameter_end' in piece:
-        return False
-    each = section['length'] / section['elements']
-    same = all(section.get(key) == piece.get(key) for key in (
-        'outer_diameter', 'inner_diameter', 'material', 'added_mass'))
-    return same and abs(each - piece['length']) <= _SAME * each

@@ -1,7 +1,8 @@
-"""What a TOML file of ROSS says, read with suspicion."""
+"""What a file of ROSS says, TOML or JSON, read with suspicion."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+import json
 import math
 from pathlib import Path
 import tomllib
@@ -48,14 +49,26 @@ class RossFile:
         try:
             if path.stat().st_size > _LARGEST_BYTES:
                 raise InputError(f'{path}: must be smaller than {_LARGEST_BYTES} bytes')
-            return cls(path, tomllib.loads(path.read_text(encoding='utf-8')))
+            text = path.read_text(encoding='utf-8')
+            is_json = path.suffix.lower() == '.json'
+            tables = json.loads(text) if is_json else tomllib.loads(text)
         except OSError as error:
             raise InputError(f'{path}: cannot be read: {error.strerror}') from error
         except UnicodeDecodeError as error:
             raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') \
                 from error
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
-            raise InputError(f'{path}: is not TOML: {" ".join(str(error).split())}') from error
+        except (tomllib.TOMLDecodeError, json.JSONDecodeError, RecursionError) as error:
+            kind = 'JSON' if path.suffix.lower() == '.json' else 'TOML'
+            raise InputError(f'{path}: is not {kind}: {" ".join(str(error).split())}') from error
+        if not isinstance(tables, dict):
+            raise InputError(f'{path}: must hold elements by their names, got {shown(tables)}')
+        return cls(path, tables)
+
+    @property
+    def major(self) -> int:
+        """Number before the first dot of the version that saved it, 0 if it does not say."""
+        first = str(self.tables.get('ross_version', '')).partition('.')[0]
+        return int(first) if first.isascii() and first.isdigit() and len(first) < 10 else 0
 
     def error(self, place: str, problem: str) -> InputError:
         """Return the error to raise at a place of the file."""
