@@ -24,9 +24,16 @@ class BlockEntries:
         """Return the blocks, or None where one is at fault."""
         entries = self.faults.entries.foundations
         blocks = self.faults.attempt_each(self._foundation, entries)
-        if blocks is None:
-            return None
+        if blocks is None or self._is_undecided:
+            return blocks
         return self.faults.attempt(lambda: self._apart(blocks))
+
+    @property
+    def _is_undecided(self) -> bool:
+        """Whether a bearing does not say on which of several blocks it stands."""
+        entries = self.faults.entries
+        return len(entries.foundations) > 1 and any(
+            bearing.foundation is None for bearing in entries.rotor.bearings)
 
     def _apart(self, blocks: tuple[Foundation, ...]) -> tuple[Foundation, ...]:
         self._refuse_overlap(blocks)
@@ -48,8 +55,10 @@ class BlockEntries:
         blocks = self.faults.entries.foundations
         # A bearing that names no block stands on the only one.
         own = (entry.name, None) if len(blocks) == 1 else (entry.name,)
-        seats = [bearing.position for bearing in self.faults.entries.rotor.bearings
-                 if bearing.foundation in own]
+        bearings = self.faults.entries.rotor.bearings
+        seats = [bearing.position for bearing in bearings if bearing.foundation in own]
+        if not seats and self._is_undecided:
+            seats = [0.0]  # never used: which bearing has to choose has been kept
         if not seats:
             raise self.faults.error('foundations', index, problem=f'no bearing stands on '
                                                             f'{entry.name}')

@@ -71,9 +71,12 @@ class Entry(BaseModel):
 
 
 def _meant(key: Hashable, entry: type[Entry], value: Mapping[Hashable, Any]) -> str | None:
-    """Return the key that a wrong one was probably meant to be, one that is not yet there."""
-    near = difflib.get_close_matches(str(key), set(entry.model_fields) - set(value), n=1)
-    return near[0] if near else None
+    """Return the key that a wrong one was probably meant to be, first one that is not there."""
+    known = list(entry.model_fields)
+    for choice in ([name for name in known if name not in value], known):
+        if near := difflib.get_close_matches(str(key), choice, n=1):
+            return near[0]
+    return None
 
 
 def _unknown(key: Hashable, meant: str | None, known: list[str]) -> str:
