@@ -35,6 +35,7 @@ setup(
         'matplotlib>=3.8',
         'mcap>=1.2.1',
         'numpy>=1.26',
+        'pint>=0.23',
         'pydantic>=2.5',
         'PyYAML>=6.0.1',
         'rich>=13.0',
