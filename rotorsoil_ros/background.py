@@ -1,15 +1,26 @@
 """What is slow or may hang works aside, so that no answer waits for it."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+import logging
+import os
 import queue
+import subprocess
 import sys
 import threading
 from typing import Generic, TypeVar
 
+from rotorsoil_ros.errors import RotorSoilError
+
 Item = TypeVar('Item')
+Result = TypeVar('Result')
 
 BACKLOG = 10  # batches, one each second; what a stuck viewer does not take is dropped
 PATIENCE_S = 2.0  # at the end
+GLANCE_S = 0.002  # at a child whose pipe has to be emptied
+NICE = 10  # how far a child stands back behind answers
+BAD_INPUT = 2  # status of a child that has said in one line what is wrong
 
 
 class Aside(Generic[Item]):
@@ -87,3 +98,158 @@ class Aside(Generic[Item]):
         except (OSError, RuntimeError, ValueError, OverflowError) as error:
             self.has_failed = True
             self._complain(f'{self._name} failed and nothing more is {self._done}: {error}')
+
+
+class Child:
+    """
+    A process that runs a module of this package, with little priority and one thread for BLAS.
+
+    It never raises: a child that could not be started has ended, and says why.
+    """
+
+    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+        self.failure = ''
+        self.said = ''
+        self._process: subprocess.Popen[bytes] | None = None
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', module, *arguments], stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                env={**os.environ, 'OMP_NUM_THREADS': '1'})
+        except OSError as error:
+            self.failure = f'no process can be started: {error.strerror}'
+            return
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, self._process.pid, NICE)
+
+    def has_ended(self, *, wait_s: float = GLANCE_S) -> bool:
+        """Read what the child says; return whether it has ended, and wait for it so long."""
+        if self._process is None:
+            return True
+        try:
+            _, heard = self._process.communicate(timeout=wait_s)
+        except subprocess.TimeoutExpired:
+            return False
+        status, self._process = self._process.returncode, None
+        lines = heard.decode(errors='replace').strip().splitlines()
+        self.said = lines[-1] if lines else ''
+        if status == BAD_INPUT and self.said:
+            self.failure = self.said
+        elif status:
+            self.failure = f'status {status}: {self.said or "nothing was said"}'
+        return True
+
+    def kill(self) -> None:
+        """End the child now."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
+            self.failure = 'was stopped'
+
+
+def run_as_child(work: Callable[[Sequence[str]], object]) -> None:
+    """Be a Child: do the work with the arguments of the command line; say a fault in one line."""
+    try:
+        work(sys.argv[1:])
+    except (RotorSoilError, OSError) as error:
+        logging.getLogger(__name__).error('%s', error)  # to stderr: nobody has set logging up
+        raise SystemExit(BAD_INPUT) from error
+
+
+@dataclass(slots=True)
+class _Job:
+    """What a child is to do, and who looks at what it has done."""
+
+    start: Callable[[], Child | None]
+    finish: Callable[[Child], None]
+    is_wanted: bool = True
+
+
+class Children:
+    """
+    Children one after the other, or a few at once, looked after by whoever calls `step`.
+
+    A new job replaces the one of the same name that waits, and nobody is told any more of one
+    that runs: it does what is no longer asked for.
+    """
+
+    def __init__(self, *, at_once: int = 1) -> None:
+        self._at_once = at_once
+        self._waiting: dict[str, _Job] = {}
+        self._running: list[tuple[str, _Job, Child]] = []
+
+    @property
+    def are_done(self) -> bool:
+        """Whether nothing is left to do."""
+        return not self._waiting and not self._running
+
+    def ask(
+        self, name: str, start: Callable[[], Child | None], finish: Callable[[Child], None],
+    ) -> None:
+        """Queue a job; where `start` gives no child, it is done."""
+        self.forget(name)
+        self._waiting[name] = _Job(start, finish)
+
+    def forget(self, name: str) -> None:
+        """Take back what was asked under a name."""
+        self._waiting.pop(name, None)
+        for running, job, _ in self._running:
+            job.is_wanted = job.is_wanted and running != name
+
+    def step(self, *, wait_s: float = GLANCE_S) -> None:
+        """Look at those that run, waiting for each so long; start the next ones."""
+        for entry in list(self._running):
+            _, job, child = entry
+            if child.has_ended(wait_s=wait_s):
+                self._running.remove(entry)
+                if job.is_wanted:
+                    job.finish(child)
+        while self._waiting and len(self._running) < self._at_once:
+            name = next(iter(self._waiting))
+            job = self._waiting.pop(name)
+            if (started := job.start()) is not None:
+                self._running.append((name, job, started))
+
+    def close(self) -> None:
+        """Forget every job and end what runs."""
+        self._waiting = {}
+        for _, _, child in self._running:
+            child.kill()
+        self._running = []
+
+
+class Errand(Generic[Result]):
+    """
+    One piece of work on a thread of its own; what came of it is there when it is done.
+
+    Attributes
+    ----------
+    result : anything, or None
+        What the work returned.
+    failure : str
+        Why it returned nothing.
+
+    """
+
+    def __init__(self, work: Callable[[], Result], *, name: str) -> None:
+        self.result: Result | None = None
+        self.failure = 'it ended without a word'
+        self.has_begun = True
+        self._work = work
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        try:
+            self._thread.start()
+        except RuntimeError as error:  # the limit of threads
+            self.has_begun, self.failure = False, str(error)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is a result or a failure."""
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            self.result, self.failure = self._work(), ''
+        except (RotorSoilError, OSError, RuntimeError, MemoryError) as error:
+            self.failure = str(error) or type(error).__name__

@@ -30,11 +30,17 @@ def string_records(*, start=START):
     return Records('/rotorsoil/fan/model', STRING, [start], [bytes(payload)], latched=True)
 
 
-def read_all(path):
+def read_all(path, **options):
     return [(source.topic, time, payload)
-            for source, time, payload in bag_reader.messages(path, lambda *_: True)]
+            for source, time, payload in bag_reader.messages(path, lambda *_: True, **options)]
 
 
 def written(*batches):
     return sorted((time, records.topic, payload) for records in batches
                   for time, payload in zip(records.log_time_ns, records.payloads, strict=True))
+
+
+def topics_of(path):
+    """Return type and number of messages of every topic that is CDR."""
+    return {source.topic: (source.type, number)
+            for source, number in bag_reader.sources(path).items() if source.encoding == 'cdr'}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.profile import BATCH, Place, place
+from rotorsoil_ros.bags.profile import BATCH, inputs as inputs_among, is_input, near_misses, Place
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.monitor.monitor import Monitor
@@ -37,6 +37,8 @@ class Inputs:
         Place of every input, and how many messages it has.
     models : tuple of str
         Topics on which a node told what its predictions rest on.
+    remarks : dict of str
+        What of the bag cannot be read, and why: each once, in their order.
 
     """
 
@@ -45,6 +47,7 @@ class Inputs:
     machine: str
     topics: Mapping[str, tuple[Place, int]]
     models: tuple[str, ...]
+    remarks: dict[str, None]
 
     @classmethod
     def of(cls, bag: Path, *, machine: str = '', like: str = '') -> 'Inputs':
@@ -66,16 +69,16 @@ class Inputs:
             If the bag cannot be read, or does not tell the speed of just one such machine.
 
         """
-        listed = bag_reader.topics(bag)
-        found = {topic: (where, number) for topic, (kind, number) in listed.items()
-                 if (where := place(topic, kind))}
+        remarks = dict[str, None]()
+        sources = bag_reader.sources(bag, tell=remarks.setdefault)
+        found, missed = inputs_among(sources), near_misses(sources)
         speaking = {(where.namespace, where.machine) for where, number in found.values()
                     if where.name in SPEED_TOPICS and number}
         wanted = machine or (like if len(speaking) > 1 else '')
         chosen = {each for each in speaking if wanted in ('', each[1])}
         if len(chosen) != 1:
-            speeds = ', '.join(topic for topic, (where, _) in found.items()
-                               if where.name in SPEED_TOPICS) or 'none'
+            speeds = ', '.join([*(topic for topic, (where, _) in found.items()
+                                  if where.name in SPEED_TOPICS), *missed]) or 'none'
             needed = machine or (f'one machine, or one called {like}' if like else 'one machine')
             raise InputError(f'{bag}: must tell the speed of {needed} on joint_states or '
                              f'rotor/speed; speed topics: {speeds}')
@@ -83,8 +86,10 @@ class Inputs:
         return cls(bag, namespace, name, {
             topic: (where, number) for topic, (where, number) in found.items()
             if (where.namespace, where.machine) == (namespace, name)},
-            tuple(topic for topic, (kind, _) in listed.items()
-                  if kind == STRING and topic.endswith(f'/{name}/model')))
+            tuple(source.topic for source in sources
+                  if is_model(source.topic, source.type)
+                  and source.topic.endswith(f'/{name}/model')),
+            remarks | dict.fromkeys(missed))
 
     @property
     def number(self) -> int:
@@ -101,7 +106,8 @@ class Inputs:
         """Return what a node told of its model, with the time when; what is malformed is not."""
         found: list[tuple[int, Mapping[str, Any]]] = []
         for batch in bag_reader.batches(
-                self.bag, lambda topic, _: topic in self.models, at_most=1):
+                self.bag, lambda topic, kind: topic in self.models and is_model(topic, kind),
+                at_most=1):
             if (description := _description(batch.payloads[0])) is not None:
                 found.append((batch.log_time_ns[0], description))
         return found
@@ -139,8 +145,10 @@ def feed(
     at_most, span_ns = (AT_ONCE, NANOSECONDS) if inputs.is_measured else (BATCH, LAST_STAMP)
     second = now_ns = None
     for batch in bag_reader.batches(
-            inputs.bag, lambda topic, _: topic in inlets or topic in models,
-            at_most=at_most, span_ns=span_ns):
+            inputs.bag, lambda topic, kind: (
+                (topic in inlets and is_input(topic, kind))
+                or (topic in models and is_model(topic, kind))),
+            at_most=at_most, span_ns=span_ns, tell=inputs.remarks.setdefault):
         if batch.topic in models:
             assert on_description is not None
             _tell(batch, on_description)
@@ -157,6 +165,11 @@ def feed(
     if now_ns is not None:
         monitor.tick(now_ns, stale_after_s=math.inf)
         monitor.finish(now_ns)
+
+
+def is_model(topic: str, message_type: str) -> bool:
+    """Return whether a topic is one on which a node tells what its predictions rest on."""
+    return message_type == STRING and topic.endswith('/model')
 
 
 def _tell(batch: Records, on_description: Described) -> None:

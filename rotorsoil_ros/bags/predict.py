@@ -1,14 +1,16 @@
 """What would the node have answered to a recorded profile? The same numbers, without a graph."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+import os
 from pathlib import Path
 from typing import Protocol
 
-from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.feed import feed, Inputs
+from rotorsoil_ros.bags.metadata import files
+from rotorsoil_ros.bags.profile import joints
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
@@ -22,10 +24,26 @@ from rotorsoil_ros.wire.messages import Encoder, Messenger, Topics
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What became of a profile: under which name, and how many speeds for which reason."""
+    """
+    What became of a profile.
+
+    Attributes
+    ----------
+    machine : str
+        Under which name it was answered.
+    counts : Counter
+        How many speeds for which reason.
+    remarks : tuple of str
+        What of the profile could not be read, and why.
+    failure : str
+        Why not one speed is answered; nothing where one is.
+
+    """
 
     machine: str
     counts: Counter[str]
+    remarks: tuple[str, ...] = ()
+    failure: str = ''
 
 
 class Screen(Protocol):
@@ -64,6 +82,11 @@ def predict(
     progress : callable
         Called with the number of messages read and their total.
 
+    Returns
+    -------
+    Answered
+        Where not one speed was answered, with the reason; then nothing is left at `out`.
+
     Raises
     ------
     InputError
@@ -71,11 +94,13 @@ def predict(
 
     """
     inputs = Inputs.of(profile, like=machine.case.name)
-    if out.exists() and any(out.samefile(file) for file in bag_reader.files(profile)):
+    if out.exists() and any(out.samefile(file) for file in files(profile)):
         raise InputError(f'{out}: is the profile itself')
     name = inputs.machine or machine.case.name
     with ExitStack() as stack:
-        log = stack.enter_context(LogFile(out))
+        partial = out.with_name(f'{out.name}.partial')
+        stack.callback(partial.unlink, missing_ok=True)
+        log = stack.enter_context(LogFile(partial))
         encoder = Encoder(machine.table.channels, Topics.of(inputs.namespace, name))
         viewer = [stack.enter_context(screen(name))] if screen else []
         monitor = Monitor(name, machine.table, machine.case.unbalance,
@@ -91,4 +116,20 @@ def predict(
                 sink.flush()
             if progress:
                 progress(done, inputs.number)
-    return Answered(name, monitor.health.counts)
+        log.close()
+        failure = _why_nothing(inputs, monitor.health.counts, rotor_joint)
+        if not failure:
+            os.replace(partial, out)
+    return Answered(name, monitor.health.counts, tuple(inputs.remarks), failure)
+
+
+def _why_nothing(inputs: Inputs, counts: Mapping[str, int], rotor_joint: str) -> str:
+    """Say why not one speed is answered; nothing where one is."""
+    if counts['answered']:
+        return ''
+    told = ', '.join(f'{number} {reason.replace("_", " ")}' for reason, number in counts.items()
+                     if number and reason not in ('received', 'measured', 'samples'))
+    if counts['joint_missing']:
+        there = ', '.join(joints(inputs.bag, inputs.topics))
+        told += f' (needed is {rotor_joint}, there are {there})'
+    return f'nothing is answered: {told or "no speed is told"}'

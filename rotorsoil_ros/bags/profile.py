@@ -1,6 +1,7 @@
 """What did the speed of a machine do? Profiles in bags: found, read, written, measured."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 import csv
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,16 +10,18 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.reader import CDR, Source
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS, Profile
 from rotorsoil_ros.units import rpm_to_rad_s, SECONDS_PER_MINUTE
-from rotorsoil_ros.wire.cdr import ARRAYS
+from rotorsoil_ros.wire.cdr import ARRAYS, Layout
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import raw_channel, ROTOR_JOINT, SPEED_TOPICS, SpeedReader, TOPICS
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 BATCH = 1024
+IMU_NAME = 'measured/<channel>/imu'
 MICROMETRE = 1e-6
 
 
@@ -51,6 +54,40 @@ def place(topic: str, message_type: str) -> Place | None:
             namespace, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
             return Place(namespace, machine, name)
     return None
+
+
+def near_misses(sources: Iterable[Source]) -> list[str]:
+    """Return a line for every topic that is named like an input but is none, and why."""
+    told = []
+    for source in sources:
+        named = next((name for name in (*TOPICS, IMU_NAME) if _is_named(source.topic, name)), '')
+        needed = TOPICS.get(named, IMU)
+        if named and (source.encoding != CDR or source.type != needed):
+            told.append(f'{source.topic} is {source.type or "of no type"} ({source.encoding}), '
+                        f'needed is {needed} ({CDR})')
+    return told
+
+
+def _is_named(topic: str, name: str) -> bool:
+    if name == IMU_NAME:
+        return raw_channel('/'.join(topic.split('/')[-3:])) is not None
+    return topic.endswith(f'/{name}')
+
+
+def inputs(sources: Mapping[Source, int]) -> dict[str, tuple[Place, int]]:
+    """Return place and number of messages of every topic that is an input of a machine."""
+    return {source.topic: (found, number) for source, number in sources.items()
+            if source.encoding == CDR and (found := place(source.topic, source.type))}
+
+
+def joints(path: Path, topics: Container[str]) -> list[str]:
+    """Return the joints that the first message of some topics tells of."""
+    found = bag_reader.messages(
+        path, lambda topic, kind: topic in topics and kind == JOINT_STATE)
+    for _, _, cdr in found:
+        with suppress(InputError):
+            return list(Layout.of(JOINT_STATE, cdr).texts['name'])
+    return []
 
 
 def tells_speed(topic: str, message_type: str) -> bool:

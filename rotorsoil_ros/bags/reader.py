@@ -1,13 +1,15 @@
 """What does a bag hold? Its messages in the order in which they were received, chunk by chunk."""
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 import errno
 import io
 from itertools import groupby, pairwise
 from pathlib import Path
-import re
+import statistics
 import struct
 from typing import BinaryIO, TypeAlias
 import zlib
@@ -20,59 +22,65 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, Schema
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
-import yaml
 import zstandard
 
+from rotorsoil_ros.bags.metadata import files
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP
+from rotorsoil_ros.wire.definitions import ros_name
+from rotorsoil_ros.wire.handlers import LONGEST_NS
 from rotorsoil_ros.wire.messages import Records
 
 RECORD_HEADER = struct.Struct('<BQ')
 MESSAGE_HEADER = struct.Struct('<HIQQ')
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+CDR = 'cdr'
 LARGEST_RECORD = 1 << 28  # [bytes]; a file that claims more is broken or hostile
 MOST_WAITING = 1 << 18  # messages of chunks that overlap; beyond, order gives way to memory
 LOOSE = 1000  # messages without a chunk are handed on in portions of so many
+SAMPLE = 100  # messages at the beginning of a file, of whose times the middle one is believed
 BROKEN = (McapError, struct.error, zstandard.ZstdError, RuntimeError, UnicodeDecodeError,
           OverflowError)
 
+Tell: TypeAlias = Callable[[str], object]
 Wanted: TypeAlias = Callable[[str, str], bool]
+Picks: TypeAlias = Callable[['Source'], bool]
 Entry: TypeAlias = tuple['Source', int, bytes]
 
 
+@dataclass(frozen=True, slots=True)
 class Source:
-    """A topic of a bag, with its type."""
+    """A channel of a bag: its topic, the type of its messages and how they are encoded."""
 
-    def __init__(self, topic: str, message_type: str, wanted: Wanted) -> None:
-        self.topic = topic
-        self.type = message_type
-        self.is_wanted = wanted(topic, message_type)
+    topic: str
+    type: str
+    encoding: str = CDR
 
 
-def topics(path: Path) -> dict[str, tuple[str, int]]:
-    """Return type and number of messages of every topic in a bag or MCAP file."""
-    found: dict[str, tuple[str, int]] = {}
+def sources(path: Path, *, tell: Tell = lambda text: None) -> Counter[Source]:
+    """Return how many messages there are of every channel of a bag or MCAP file."""
+    found, cut = Counter[Source](), list[str]()
     for file in files(path):
-        with opened(file) as stream:
-            summary = SeekingReader(stream, record_size_limit=LARGEST_RECORD).get_summary()
-        if summary is None or summary.statistics is None:
-            raise InputError(f'{file}: has no summary of its topics')
-        for channel in summary.channels.values():
-            schema = summary.schemas.get(channel.schema_id)
-            number = summary.statistics.channel_message_counts.get(channel.id, 0)
-            before = found.get(channel.topic, ('', 0))[1]
-            found[channel.topic] = (schema.name if schema else '', number + before)
+        found.update(_counted(file) or _counted_one_by_one(file, cut.append))
+    if cut and not found:
+        raise InputError(f'{"; ".join(cut)}, where nothing is')
+    for text in cut:
+        tell(text)
     return found
 
 
-def messages(path: Path, wanted: Wanted) -> Iterator[tuple[Source, int, bytes]]:
-    """Read topic, time of reception [ns] and CDR of every wanted message, one by one."""
+def messages(
+    path: Path, wanted: Wanted, *, tell: Tell = lambda text: None,
+) -> Iterator[tuple[Source, int, bytes]]:
+    """Read source, time of reception [ns] and CDR of every wanted message, one by one."""
     for file in files(path):
-        for chunk in _chunks(file, wanted):
+        for chunk in _chunks(file, wanted, tell):
             yield from chunk
 
 
 def batches(
     path: Path, wanted: Wanted, *, at_most: int, span_ns: int = LAST_STAMP,
+    tell: Tell = lambda text: None,
 ) -> Iterator[Records]:
     """
     Read wanted messages as batches of one topic; memory does not grow with the bag.
@@ -82,15 +90,17 @@ def batches(
     path : Path
         Bag directory or MCAP file.
     wanted : callable
-        Whether a topic of a type is wanted.
+        Whether a topic of a type is wanted; what is not CDR never is.
     at_most : int
         Messages in a batch.
     span_ns : int
         Topics are apart by no more than this [ns]: where it matters what is told together.
+    tell : callable
+        Hears, file by file, what was left out.
 
     """
     for file in files(path):
-        for chunk in _chunks(file, wanted):
+        for chunk in _chunks(file, wanted, tell):
             for _, span in groupby(chunk, key=lambda entry: entry[1] // span_ns):
                 yield from _by_topic(list(span), at_most)
 
@@ -107,54 +117,21 @@ def _by_topic(entries: Sequence[Entry], at_most: int) -> Iterator[Records]:
                               [payload for _, _, payload in part])
 
 
-def files(path: Path) -> list[Path]:
-    """Return the MCAP files of a bag directory in their order, or the one file that it is."""
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise InputError(f'{path}: no such file or bag directory')
-    listed = _listed(path / 'metadata.yaml')
-    found = [path / Path(name).name for name in listed] if listed else files_in(path)
-    if not found or any(file.suffix != '.mcap' for file in found):
-        raise InputError(f'{path}: holds no MCAP file; other storages must be converted first')
-    return found
-
-
-def files_in(bag: Path) -> list[Path]:
-    """Return the MCAP files that lie in a directory, in the order of their numbers."""
-    return sorted(bag.glob('*.mcap'), key=lambda file: (number_in(file.stem), file.name))
-
-
-def number_in(name: str) -> int:
-    """Return the last number in the name of a file of a bag, zero if it has none."""
-    numbers = re.findall(r'_(\d+)', name)
-    return int(numbers[-1][:18]) if numbers else 0
-
-
-def _listed(path: Path) -> list[str]:
-    """Return the files that a `metadata.yaml` names, none if it is not there."""
-    if not path.is_file():
-        return []
-    try:
-        document = yaml.safe_load(path.read_text(encoding='utf-8'))
-        return [str(name) for name in document['rosbag2_bagfile_information'][
-            'relative_file_paths']]
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError) as error:
-        raise InputError(f'{path}: is not the metadata of a bag') from error
-
-
 @contextmanager
-def opened(file: Path) -> Iterator[BinaryIO]:
-    """Open an MCAP file that was finished; say in one line what is wrong with one that is not."""
+def opened(file: Path) -> Iterator[tuple[BinaryIO, bool]]:
+    """Open an MCAP file, with whether it was finished; say in one line what is wrong with it."""
     try:
         with file.open('rb') as stream:
-            if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            magic = stream.read(len(MCAP0_MAGIC))
+            if magic.startswith(ZSTD_MAGIC):
+                raise InputError(f'{file}: is compressed as a whole; unpack it with `zstd -d`')
+            if magic != MCAP0_MAGIC:
                 raise InputError(f'{file}: is not an MCAP file')
+            size = stream.seek(0, io.SEEK_END)
             stream.seek(-len(MCAP0_MAGIC), io.SEEK_END)
-            if stream.read() != MCAP0_MAGIC:
-                raise InputError(f'{file}: was never finished; `rotorsoil recover` saves its data')
+            is_finished = stream.read() == MCAP0_MAGIC and size >= 2 * len(MCAP0_MAGIC)
             stream.seek(0)
-            yield stream
+            yield stream, is_finished
     except OSError as error:
         # A place that no file has comes from an index that somebody damaged.
         said = 'is damaged' if error.errno == errno.EINVAL else error.strerror
@@ -162,22 +139,94 @@ def opened(file: Path) -> Iterator[BinaryIO]:
     except InputError:
         raise
     except (*BROKEN, ValueError) as error:  # the library lets places of damaged indexes through
-        raise InputError(f'{file}: is damaged ({error or type(error).__name__})') from error
+        raise InputError(f'{file}: is damaged ({error or type(error).__name__}); '
+                         '`rotorsoil recover` saves the rest') from error
 
 
-def _chunks(file: Path, wanted: Wanted) -> Iterator[list[Entry]]:
+def _summary(stream: BinaryIO) -> Summary | None:
+    """Return what a finished file says of itself, if it says all: every part of it is optional."""
+    stream.seek(0)
+    summary = SeekingReader(stream, record_size_limit=LARGEST_RECORD).get_summary()
+    if summary is None or summary.statistics is None:
+        return None
+    said = summary.statistics
+    is_whole = (said.channel_message_counts.keys() <= summary.channels.keys()
+                and sum(said.channel_message_counts.values()) == said.message_count
+                and len(summary.chunk_indexes) == said.chunk_count)
+    return summary if is_whole else None
+
+
+def _counted(file: Path) -> Counter[Source] | None:
+    """Return the messages of every channel as a file sums them up; None where it does not."""
+    with opened(file) as (stream, is_finished):
+        summary = _summary(stream) if is_finished else None
+    if summary is None or summary.statistics is None:
+        return None
+    said = summary.statistics.channel_message_counts
+    names = {number: schema.name for number, schema in summary.schemas.items()}
+    found: Counter[Source] = Counter()
+    for channel in summary.channels.values():
+        found[_source(channel, names)] += said.get(channel.id, 0)
+    return found
+
+
+def _counted_one_by_one(file: Path, tell: Tell) -> Counter[Source]:
+    contents, found = Contents(lambda source: True, with_payloads=False), Counter[Source]()
+    with opened(file) as (stream, is_finished):
+        for _ in _in_order(stream, contents, is_finished=is_finished, file=file, tell=tell):
+            found.update(source for source, _, _ in contents.take())
+        found.update(dict.fromkeys(contents.sources, 0))
+    return found
+
+
+def _chunks(file: Path, wanted: Wanted, tell: Tell) -> Iterator[list[Entry]]:
     """Read wanted messages chunk by chunk; chunks that overlap in time are merged."""
-    contents = Contents(wanted)
-    with opened(file) as stream:
-        summary = SeekingReader(stream, record_size_limit=LARGEST_RECORD).get_summary()
+    with opened(file) as (stream, is_finished):
+        contents = Contents(
+            lambda source: source.encoding == CDR and wanted(source.topic, source.type),
+            around_ns=usual_time(stream))
+        summary = _summary(stream) if is_finished else None
         if summary is not None and _overlap(summary.chunk_indexes):
             yield from _merged(stream, summary, contents)
-            return
-        stream.seek(len(MCAP0_MAGIC))
-        while (opcode := contents.read(stream)) not in (Opcode.DATA_END, Opcode.FOOTER):
-            if opcode == Opcode.CHUNK or len(contents.entries) >= LOOSE:
+        else:
+            for _ in _in_order(
+                    stream, contents, is_finished=is_finished, file=file, tell=tell):
                 yield sorted(contents.take(), key=_time)
-        yield sorted(contents.take(), key=_time)
+    for source, times in contents.wrong_times.items():
+        tell(f'{file}: {source.topic}: {len(times)} messages with an impossible time are left '
+             f'out, the first at {times[0]} ns')
+
+
+def usual_time(stream: BinaryIO) -> int | None:
+    """Return the time around which those of a file lie, by its first messages [ns]."""
+    contents = Contents(lambda source: True, with_payloads=False)
+    stream.seek(len(MCAP0_MAGIC))
+    try:
+        while len(contents.entries) < SAMPLE and contents.read(stream) not in ENDS:
+            pass
+    except BROKEN:  # whoever reads on will meet it again
+        pass
+    return statistics.median_high([time for _, time, _ in contents.entries] or [0]) or None
+
+
+ENDS = (Opcode.DATA_END, Opcode.FOOTER)
+
+
+def _in_order(
+    stream: BinaryIO, contents: 'Contents', *, is_finished: bool, file: Path, tell: Tell,
+) -> Iterator[None]:
+    """Read records in the order of the file, in portions; one that is cut off up to there."""
+    stream.seek(len(MCAP0_MAGIC))
+    try:
+        while (opcode := contents.read(stream)) not in ENDS:
+            if opcode == Opcode.CHUNK or len(contents.entries) >= LOOSE:
+                yield
+    except BROKEN:
+        if is_finished:
+            raise
+    yield
+    if not is_finished:
+        tell(f'{file}: was never finished; it is read up to its break')
 
 
 def _overlap(indexes: Sequence[ChunkIndex]) -> bool:
@@ -204,14 +253,30 @@ def _time(entry: Entry) -> int:
     return entry[1]
 
 
+def _source(channel: Channel, names: Mapping[int, str]) -> Source:
+    name = names.get(channel.schema_id, '')
+    encoding = channel.message_encoding
+    return Source(channel.topic, ros_name(name) if encoding == CDR else name, encoding)
+
+
 class Contents:
     """What of a file has been read and not yet taken."""
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(
+        self, picks: Picks, *, around_ns: int | None = None, with_payloads: bool = True,
+    ) -> None:
         self.entries: list[Entry] = []
-        self._wanted = wanted
+        self.wrong_times: dict[Source, list[int]] = {}
+        self._picks = picks
+        self._with_payloads = with_payloads
+        self._earliest_ns, self._latest_ns = possible_times(around_ns)
         self._schemas: dict[int, str] = {0: ''}
-        self._sources: dict[int, Source] = {}
+        self._sources: dict[int, tuple[Source, bool]] = {}
+
+    @property
+    def sources(self) -> list[Source]:
+        """All that were announced so far."""
+        return [source for source, _ in self._sources.values()]
 
     def take(self) -> list[Entry]:
         """Hand over what was read."""
@@ -227,12 +292,16 @@ class Contents:
     def read(self, stream: BinaryIO) -> int:
         """Read the next record of the file and return its kind."""
         opcode, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
-        if length > LARGEST_RECORD:
-            raise McapError(f'a record of {length} bytes')
-        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-            self._add(opcode, stream.read(length), 0, length)
-        elif opcode == Opcode.CHUNK:
-            self._unpack(unpacked(stream.read(length)))
+        if length > LARGEST_RECORD or not opcode:
+            raise McapError(f'a record of kind {opcode} and {length} bytes')
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK):
+            content = stream.read(length)
+            if len(content) < length:
+                raise McapError('a record that ends after the file')
+            if opcode == Opcode.CHUNK:
+                self._unpack(unpacked(content))
+            else:
+                self._add(opcode, content, 0, length)
         else:
             stream.seek(length, io.SEEK_CUR)
         return int(opcode)
@@ -245,12 +314,16 @@ class Contents:
         """Keep a message that is wanted; learn from a schema or a channel."""
         if opcode == Opcode.MESSAGE:
             channel, _, log_time, _ = MESSAGE_HEADER.unpack_from(body, at)
-            source = self._sources.get(channel)
-            if source is None or log_time > LAST_STAMP:
-                raise McapError(f'channel {channel}, time {log_time}')
-            if source.is_wanted:
-                payload = body[at + MESSAGE_HEADER.size:at + length]
-                self.entries.append((source, log_time, payload))
+            if channel not in self._sources:
+                raise McapError(f'a message of an unknown channel {channel}')
+            source, is_wanted = self._sources[channel]
+            if not is_wanted:
+                return
+            if not self._earliest_ns <= log_time <= self._latest_ns:
+                self.wrong_times.setdefault(source, []).append(log_time)
+                return
+            payload = body[at + MESSAGE_HEADER.size:at + length] if self._with_payloads else b''
+            self.entries.append((source, log_time, payload))
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(ReadDataStream(io.BytesIO(body[at:at + length])))
             self._schemas[schema.id] = schema.name
@@ -259,8 +332,15 @@ class Contents:
 
     def _announce(self, channel: Channel) -> None:
         if channel.id not in self._sources:
-            self._sources[channel.id] = Source(
-                channel.topic, self._schemas.get(channel.schema_id, ''), self._wanted)
+            source = _source(channel, self._schemas)
+            self._sources[channel.id] = source, self._picks(source)
+
+
+def possible_times(around_ns: int | None) -> tuple[int, int]:
+    """Return the earliest and the latest time that a file may tell, by one that it does [ns]."""
+    if around_ns is None:
+        return 0, LAST_STAMP
+    return max(0, around_ns - LONGEST_NS), min(LAST_STAMP, around_ns + LONGEST_NS)
 
 
 def unpacked(content: bytes) -> bytes:

@@ -9,8 +9,8 @@ import shutil
 from typing import TypeAlias
 
 from rotorsoil_ros.background import Aside
-from rotorsoil_ros.bags.retention import make_room
-from rotorsoil_ros.bags.writer import BagWriter, MEBIBYTE, new_directory
+from rotorsoil_ros.bags.retention import make_room, new_directory
+from rotorsoil_ros.bags.writer import BagWriter, last_of, MEBIBYTE
 from rotorsoil_ros.events import Diagnostics, Level
 from rotorsoil_ros.wire.messages import Records
 
@@ -30,36 +30,43 @@ class Recorder:
     """
 
     def __init__(
-        self, path: Path, *, split_mib: float, split_s: float, budget_mib: float, tell: Tell,
-        complain: Tell,
+        self, directory: Path, name: str, *, split_mib: float, split_s: float,
+        budget_mib: float, tell: Tell, complain: Tell,
     ) -> None:
-        self._directory, self._name = path.parent, path.name
+        self._directory, self._name = directory, name
         self._budget = int(budget_mib * MEBIBYTE)
         largest = budget_mib / FILES_IN_BUDGET
         self._split_mib = min(split_mib or largest, largest) if budget_mib else split_mib
         self._split_s = split_s
         self._tell, self._complain = tell, complain
+        self._told_of: set[str] = set()
         self._failure = ''
         self._has_resumed = False
         self._accepted = self._written_before = self._lost_before = 0
         self._lost_until_ns = 0
         self._looked_at = 0
-        self._bag = self._new_bag(path)
+        self._gaps: dict[str, str] = {}
+        self._latched: dict[str, Records] = {}
+        self._bag: BagWriter | None = None
+        try:
+            self._bag = self._new_bag(self._gaps)
+        except OSError as error:
+            self._fail(error)
         self._make_room()
 
     @property
-    def path(self) -> Path:
-        """Directory of the bag."""
-        return self._bag.path
+    def path(self) -> Path | None:
+        """Directory of the bag, as soon as the disk takes one."""
+        return None if self._bag is None else self._bag.path
 
     @property
-    def file(self) -> Path:
+    def file(self) -> Path | None:
         """The file that is being written."""
-        return self._bag.file
+        return None if self._bag is None else self._bag.file
 
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
-        if self._failure:
+        if self._failure or self._bag is None:
             self._miss(records)
             return
         self._accepted += len(records.payloads)
@@ -71,7 +78,7 @@ class Recorder:
     def flush(self) -> None:
         """Put everything onto the disk, or try whether it works again; call it every second."""
         try:
-            if self._failure:
+            if self._failure or self._bag is None:
                 self._resume()
             else:
                 self._bag.flush()
@@ -85,54 +92,61 @@ class Recorder:
         self._accepted += count
         if not self._failure:
             self._failure = reason
-            self._bag.abandon()
+            if self._bag is not None:
+                self._bag.abandon()
         self._lost_until_ns = until_ns
         self.flush()
 
     def close(self) -> None:
         """Finish the bag."""
         try:
-            self._bag.close()
+            if self._bag is not None:
+                self._bag.close()
         except OSError as error:
             self._fail(error)
 
     def report(self, now_ns: int) -> Diagnostics:
         """Tell how logging goes."""
-        bag, lost = self._bag, self._lost if self._failure else self._lost_before
+        lost = self._lost if self._failure else self._lost_before
         if self._failure:
             level, summary = Level.ERROR, f'not logging: {self._failure}'
         elif self._has_resumed:
-            level, summary = Level.WARN, f'logging again to {bag.file}, {lost} messages are lost'
+            level, summary = Level.WARN, f'logging again to {self.file}, {lost} messages are lost'
         else:
-            level, summary = Level.OK, f'logging to {bag.file}'
+            level, summary = Level.OK, f'logging to {self.file}'
         self._has_resumed = False
-        values = {'written': self._written, 'lost': lost, 'gaps': len(bag.gaps),
-                  'size_bytes': bag.size}
+        values = {'written': self._written, 'lost': lost, 'gaps': len(self._gaps),
+                  'size_bytes': 0 if self._bag is None else self._bag.size}
         with suppress(OSError):
-            values['free_bytes'] = shutil.disk_usage(bag.path).free
+            values['free_bytes'] = shutil.disk_usage(self.path or self._directory).free
         return Diagnostics('log', now_ns, level, summary, values)
 
     def _miss(self, records: Records) -> None:
         """Count what cannot be logged now; what is latched will be."""
         if records.latched:
-            self._bag.remember(records)
+            self._latched[records.topic] = last_of(records)
         else:
             self._accepted += len(records.payloads)
             self._lost_until_ns = records.log_time_ns[-1]
 
     @property
     def _written(self) -> int:
-        return self._written_before + self._bag.written
+        return self._written_before + (0 if self._bag is None else self._bag.written)
 
     @property
     def _lost(self) -> int:
         return self._accepted - self._written
 
     def _fail(self, error: OSError) -> None:
-        if not self._failure:
-            self._failure = error.strerror or str(error)
+        if self._failure:
+            return
+        self._failure = error.strerror or str(error)
+        self._lost_until_ns = 0
+        if self._bag is None:
+            self._complain(f'log {self._directory / self._name} cannot be begun and is tried '
+                           f'again: {self._failure}')
+        else:
             self._bag.abandon()
-            self._lost_until_ns = 0
             self._complain(
                 f'log {self._bag.path} failed and has a gap from here on: {self._failure}')
 
@@ -144,31 +158,40 @@ class Recorder:
             reserve(self._directory)
             gap = f'{self._lost - self._lost_before} messages until {self._lost_until_ns} ns: ' \
                   f'{self._failure}'
-            if self._bag.path.is_dir():
+            if self._bag is not None and self._bag.path.is_dir():
                 self._bag.resume(gap)
             else:
-                gaps = {**self._bag.gaps, f'gap_{len(self._bag.gaps) + 1}': gap}
                 written = self._written
-                self._bag = self._new_bag(
-                    new_directory(self._directory, self._name), gaps, self._bag.latched)
+                gaps = {**self._gaps, f'gap_{len(self._gaps) + 1}': gap}
+                self._bag, self._gaps = self._new_bag(gaps), gaps
                 self._written_before = written
             self._lost_before = self._lost
             self._failure, self._has_resumed = '', True
             self._tell(f'log goes on in {self._bag.file}, without {gap}')
 
-    def _new_bag(
-        self, path: Path, gaps: dict[str, str] | None = None,
-        latched: dict[str, Records] | None = None,
-    ) -> BagWriter:
-        return BagWriter(path, split_mib=self._split_mib, split_s=self._split_s, gaps=gaps,
-                         latched=latched)
+    def _new_bag(self, gaps: dict[str, str]) -> BagWriter:
+        path = new_directory(self._directory, self._name)
+        try:
+            return BagWriter(path, split_mib=self._split_mib, split_s=self._split_s, gaps=gaps,
+                             latched=self._latched)
+        except OSError:
+            shutil.rmtree(path, ignore_errors=True)  # it was made just now, and holds nothing
+            raise
 
     def _make_room(self) -> None:
-        if self._budget:
+        if not self._budget:
+            return
+        removed = make_room(self._directory, self._name, budget=self._budget, current=self.path,
+                            keep=self.file, complain=self._complain_once)
+        if self._bag is not None:
             self._looked_at = self._bag.size
-            for gone in make_room(self._directory, self._name, budget=self._budget,
-                                  current=self._bag.path, keep=[self.file]):
+            for gone in removed:
                 self._bag.forget(gone.name)
+
+    def _complain_once(self, text: str) -> None:
+        if text not in self._told_of:
+            self._told_of.add(text)
+            self._complain(text)
 
 
 def reserve(directory: Path) -> None:
@@ -215,7 +238,12 @@ class BagAside:
                             done='logged', backlog=BACKLOG, patience_s=PATIENCE_S)
 
     @property
-    def file(self) -> Path:
+    def path(self) -> Path | None:
+        """Directory of the bag, as soon as the disk takes one."""
+        return self._recorder.path
+
+    @property
+    def file(self) -> Path | None:
         """The file that is being written."""
         return self._recorder.file
 

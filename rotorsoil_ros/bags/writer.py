@@ -30,9 +30,13 @@ class LogFile:
         # Nobody takes the file for that of a dead writer while this one lives.
         with suppress(OSError):
             fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        self._writer = McapWriter(
-            self._stream, profile='ros2',
-            library=f'{bag_metadata.WRITER} {rotorsoil_ros.__version__}')
+        try:
+            self._writer = McapWriter(
+                self._stream, profile='ros2',
+                library=f'{bag_metadata.WRITER} {rotorsoil_ros.__version__}')
+        except OSError:
+            self._stream.close()
+            raise
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
@@ -111,11 +115,12 @@ class LogFile:
         kind = records.type
         if kind not in self._schemas:
             self._schemas[kind] = self._writer.add_schema(kind, 'ros2msg', definition(kind))
+        offered_qos = offered_qos_text(latched=records.latched)
         channel = self._writer.add_channel(records.topic, self._schemas[kind], {
-            'offered_qos_profiles': offered_qos_text(latched=records.latched),
+            'offered_qos_profiles': offered_qos,
             'topic_type_hash': type_hash(kind)}, spans=not records.latched)
         self._channels[records.topic] = channel
-        self.topics[records.topic] = Topic(records.topic, kind, records.latched)
+        self.topics[records.topic] = Topic(records.topic, kind, offered_qos)
         return channel
 
 
@@ -133,8 +138,8 @@ class BagWriter:
         gaps: dict[str, str] | None = None, latched: dict[str, Records] | None = None,
     ) -> None:
         self.path = path
-        self.gaps = gaps or {}
-        self.latched = latched or {}
+        self.gaps = {} if gaps is None else gaps
+        self.latched = {} if latched is None else latched
         self.finished_size = 0
         self._split_size = split_mib * MEBIBYTE
         self._split_ns = split_s * NANOSECONDS
@@ -143,7 +148,11 @@ class BagWriter:
         self._counts: Counter[str] = Counter()
         self._number = self._written = 0
         self._file = self._open()
-        self._write_metadata()
+        try:
+            self._write_metadata()
+        except OSError:
+            self._file.discard()
+            raise
 
     def write(self, records: Records) -> None:
         """Append messages of one topic."""
@@ -153,8 +162,7 @@ class BagWriter:
     def remember(self, records: Records) -> None:
         """Keep the last message of a latched topic for files to come."""
         if records.latched:
-            self.latched[records.topic] = records._replace(
-                log_time_ns=records.log_time_ns[-1:], payloads=records.payloads[-1:])
+            self.latched[records.topic] = last_of(records)
 
     def flush(self) -> None:
         """Put everything onto the disk; call it every second, whatever the traffic."""
@@ -255,19 +263,7 @@ class BagWriter:
         bag_metadata.write(self.path, Contents(files, topics, counts), self.gaps)
 
 
-def new_directory(directory: Path, name: str) -> Path:
-    """
-    Make and return the first of `name`, `name_2`, `name_3`... that does not exist.
-
-    What exists is never touched.
-    """
-    directory.mkdir(parents=True, exist_ok=True)
-    path, number = directory / name, 1
-    while True:
-        try:
-            path.mkdir()
-        except FileExistsError:
-            number += 1
-            path = directory / f'{name}_{number}'
-        else:
-            return path
+def last_of(records: Records) -> Records:
+    """Return the last message alone: what a latched topic is worth to latecomers."""
+    return records._replace(
+        log_time_ns=records.log_time_ns[-1:], payloads=records.payloads[-1:])

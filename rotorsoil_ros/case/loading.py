@@ -1,11 +1,11 @@
 """How do machines come into memory: every table is computed once, and not in this process."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 import os
 from pathlib import Path
-import subprocess
-import sys
 
+from rotorsoil_ros.background import Child, Children, run_as_child
 from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.machine import Machine
@@ -13,17 +13,7 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.half_space import a0_range
 
 GLANCE_S = 0.05
-BAD_INPUT = 2
 SHARES = 4  # for each core: to start a process takes longer than one more table on known soil
-
-# Stops at the first case that fails, and says which, as `rotorsoil tabulate` does.
-WORK = """
-import sys
-from rotorsoil_ros.cli import main
-for case in sys.argv[2:]:
-    if status := main(['tabulate', case, '--cache', sys.argv[1]]):
-        sys.exit(status)
-"""
 
 Tell = Callable[[str], object]
 
@@ -90,52 +80,38 @@ def tabulate(files: Sequence[Path], directory: Path, *, tell: Tell) -> None:
     """Compute the tables of cases in parallel processes, which leave them in the cache."""
     cores = os.cpu_count() or 1
     share = max(1, len(files) // (SHARES * cores))
-    waiting = [files[start:start + share] for start in range(0, len(files), share)]
-    running, done = list[tuple[Sequence[Path], subprocess.Popen[str]]](), 0
+    children, done = Children(at_once=cores), 0
+
+    def finish(cases: Sequence[Path], child: Child) -> None:
+        nonlocal done
+        if child.failure:
+            raise InputError(f'not computed: {child.failure}')
+        done += len(cases)
+        if len(files) > 1:
+            tell(f'{done} of {len(files)} tables computed: {", ".join(map(str, cases))}')
+
+    for start in range(0, len(files), share):
+        cases = files[start:start + share]
+        children.ask(str(start), partial(
+            Child, __name__, [str(directory), *map(str, cases)]), partial(finish, cases))
     try:
-        while waiting or running:
-            while waiting and len(running) < cores:
-                running.append((waiting[0], _start(waiting.pop(0), directory)))
-            for cases, process in list(running):
-                if _has_ended(process):
-                    running.remove((cases, process))
-                    _judge(cases, process)
-                    done += len(cases)
-                    if len(files) > 1:
-                        tell(f'{done} of {len(files)} tables computed: '
-                             f'{", ".join(map(str, cases))}')
+        while not children.are_done:
+            children.step(wait_s=GLANCE_S)
     finally:
-        for _, process in running:
-            process.kill()
-            process.communicate()
+        children.close()
 
 
-def _start(files: Sequence[Path], directory: Path) -> 'subprocess.Popen[str]':
-    return subprocess.Popen(
-        [sys.executable, '-c', WORK, str(directory), *map(str, files)],
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, 'OMP_NUM_THREADS': '1'})
-
-
-def _has_ended(process: 'subprocess.Popen[str]') -> bool:
-    try:
-        process.wait(GLANCE_S)
-    except subprocess.TimeoutExpired:
-        return False
-    return True
-
-
-def _judge(files: Sequence[Path], process: 'subprocess.Popen[str]') -> None:
-    """Raise InputError with what the process said if it failed."""
-    _, said = process.communicate()
-    if not process.returncode:
-        return
-    named = ', '.join(map(str, files))
-    if process.returncode == BAD_INPUT:
-        raise InputError(said.strip().splitlines()[-1] if said.strip() else f'{named}: failed')
-    raise InputError(f'{named}: not computed (status {process.returncode})')
+def _compute(arguments: Sequence[str]) -> None:
+    """Leave the tables of cases in a cache; stop at the first that fails."""
+    directory, *files = arguments
+    for file in files:
+        Machine.load(Path(file), cache_directory=Path(directory))
 
 
 def _is_tabulated(case: config.Case, directory: Path) -> bool:
     key = models.response_key(case, models.coupled_model(case, directory))
     return Cache(directory).path('response', key).exists()
+
+
+if __name__ == '__main__':
+    run_as_child(_compute)

@@ -21,6 +21,11 @@ def predict(arguments: Namespace) -> int:
     with progress('predicting') as report:
         answered = answer(machine, arguments.profile, arguments.output, progress=report,
                           screen=arguments.rrd and recorder(arguments.rrd, machine))
+    for remark in answered.remarks:
+        print(remark, file=sys.stderr)
+    if answered.failure:
+        print(f'{arguments.profile}: {answered.failure}', file=sys.stderr)
+        return 1
     counts = ', '.join(f'{number} {reason}' for reason, number in answered.counts.items())
     print(f'{arguments.output}: {answered.machine}: {counts}')
     return 0

@@ -3,21 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import json
-import os
 from pathlib import Path
-import subprocess
-import sys
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.background import Child, run_as_child
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.summary import clipped, unstable
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN
 from rotorsoil_ros.channel import ACROSS
-from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
@@ -210,27 +208,18 @@ def criteria(
     return found
 
 
-def start_aside(
-    file: Path, unbalance: ComplexArray, directory: Path,
-) -> 'subprocess.Popen[str]':
-    """Start a process of low priority that leaves the criteria of a case in the cache."""
+def compute_aside(file: Path, unbalance: ComplexArray, directory: Path) -> Child:
+    """Start a process that leaves the criteria of a case in the cache."""
     parts = json.dumps(unbalance.view(float).tolist())
-    return subprocess.Popen(
-        [sys.executable, '-m', __name__, str(file), str(directory), parts],
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, 'OMP_NUM_THREADS': '1'})
+    return Child(__name__, [str(file), str(directory), parts])
 
 
-def _main(arguments: Sequence[str]) -> None:
+def _compute(arguments: Sequence[str]) -> None:
     file, directory, parts = arguments
-    os.nice(_NICE)
-    try:
-        case = config.load(Path(file))
-        criteria(case, models.coupled_model(case, Path(directory)),
-                 np.array(json.loads(parts), dtype=float).view(complex), Path(directory))
-    except RotorSoilError as error:
-        raise SystemExit(str(error)) from error
+    case = config.load(Path(file))
+    criteria(case, models.coupled_model(case, Path(directory)),
+             np.array(json.loads(parts), dtype=float).view(complex), Path(directory))
 
 
 if __name__ == '__main__':
-    _main(sys.argv[1:])
+    run_as_child(_compute)

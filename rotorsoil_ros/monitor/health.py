@@ -9,9 +9,11 @@ from rotorsoil_ros.units import rad_s_to_rpm
 
 GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unstable',
         'unresolved')
-FAULTS = (*GAPS, 'malformed', 'velocity_missing')
+FAULTS = (*GAPS, 'malformed', 'velocity_missing', 'stamp_missing')
+REDATED = ('stamp_not_set', 'stamp_far_off')  # answered at the time of reception
 STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
-COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *STAMPS, 'measured', 'samples')
+COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *REDATED, *STAMPS, 'measured',
+           'samples')
 
 
 class Health:
@@ -36,7 +38,7 @@ class Health:
     def note(self, reason: str, count: int = 1) -> None:
         """Count something that happened."""
         self.counts[reason] += count
-        if reason in FAULTS:
+        if reason in FAULTS or reason in REDATED:
             self._faults += count
 
     def receive(self, stamp_ns: IntArray, speed: FloatArray) -> None:
@@ -110,8 +112,13 @@ class Health:
         if self.level is Level.OK:
             rate = f', {self._rate_hz:.1f} per second' if self._rate_hz else ''
             return f'every speed is answered{rate}'
-        if self.publishers > 1 and not any(self._since_tick(reason) for reason in FAULTS):
-            return f'{self.publishers} publishers tell the speed'
-        faults = {reason: self._since_tick(reason) for reason in FAULTS}
-        told = [f'{count} {reason.replace("_", " ")}' for reason, count in faults.items() if count]
-        return 'without an answer: ' + ', '.join(told)
+        if unanswered := self._told(FAULTS):
+            return f'without an answer: {unanswered}'
+        if redated := self._told(REDATED):
+            return f'dated on reception: {redated}'
+        return f'{self.publishers} publishers tell the speed'
+
+    def _told(self, reasons: tuple[str, ...]) -> str:
+        """Return how often each of some reasons was noted since the last tick."""
+        return ', '.join(f'{count} {reason.replace("_", " ")}' for reason in reasons
+                         if (count := self._since_tick(reason)))

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-import subprocess
 
 from rotorsoil_ros.arrays import ComplexArray
+from rotorsoil_ros.background import Child, Children
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.monitor.criteria import Criteria, start_aside, stored_criteria
+from rotorsoil_ros.monitor.criteria import compute_aside, Criteria, stored_criteria
 
 Tell = Callable[[str], object]
 
@@ -32,51 +33,35 @@ class Bench:
     def __init__(self, directory: Path, *, complain: Tell) -> None:
         self._directory = directory
         self._complain = complain
-        self._questions: dict[str, Question] = {}
-        self._process: subprocess.Popen[str] | None = None
-        self._asked: tuple[str, Question] | None = None
+        self._children = Children()
 
     def ask(
         self, name: str, machine: Machine, unbalance: ComplexArray,
         take: Callable[[Criteria], None],
     ) -> None:
         """Answer at once if the cache can, else some time later, in `step`."""
-        self._questions.pop(name, None)
+        self._children.forget(name)
         question = Question(machine, unbalance, take)
         if not self._answer(question):
-            self._questions[name] = question
+            self._children.ask(name, partial(self._start, question),
+                               partial(self._finish, name, question))
 
     def step(self) -> None:
         """Look after the process; start the next one. Called once a second."""
-        if self._process is not None and self._process.poll() is not None:
-            self._finish(self._process)
-        while self._process is None and self._questions:
-            name, question = next(iter(self._questions.items()))
-            if self._answer(question):  # another machine of the same case was first
-                del self._questions[name]
-                continue
-            self._asked = name, question
-            self._process = start_aside(
-                question.machine.case.path, question.unbalance, self._directory)
+        self._children.step()
 
     def close(self) -> None:
         """Forget every question."""
-        self._questions = {}
-        if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
-            self._process = None
+        self._children.close()
 
-    def _finish(self, process: 'subprocess.Popen[str]') -> None:
-        _, said = process.communicate()
-        assert self._asked is not None
-        (name, question), self._asked, self._process = self._asked, None, None
-        if self._questions.get(name) is not question:
-            return
-        del self._questions[name]
+    def _start(self, question: Question) -> Child | None:
+        if self._answer(question):  # another machine of the same case was first
+            return None
+        return compute_aside(question.machine.case.path, question.unbalance, self._directory)
+
+    def _finish(self, name: str, question: Question, child: Child) -> None:
         if not self._answer(question):
-            why = said.strip().splitlines()[-1] if said.strip() else (
-                f'nothing was left in {self._directory}')
+            why = child.failure or f'nothing was left in {self._directory}'
             self._complain(f'{name}: no band and no zones: {why}')
 
     def _answer(self, question: Question) -> bool:

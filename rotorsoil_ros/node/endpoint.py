@@ -1,8 +1,8 @@
 """One machine on the graph: its subscriptions, its monitor and its publishers."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, overload
 
 from rcl_interfaces.msg import Log
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
@@ -26,9 +26,31 @@ from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records,
 
 TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
 RAW_DEPTH = 1000  # samples kept while the node is busy
-STAMPED = (0,)  # reading the clock takes 3 us, and the message has its own stamp
 OUTPUT = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Arrival(Sequence[int]):
+    """
+    When a message has come [ns].
+
+    Reading the clock takes 3 us, and most messages have their own stamp: it is read when asked.
+    """
+
+    def __init__(self, node: LifecycleNode) -> None:
+        self._clock = node.get_clock()
+
+    def __len__(self) -> int:
+        return 1
+
+    @overload
+    def __getitem__(self, index: int) -> int: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[int]: ...
+
+    def __getitem__(self, index: int | slice) -> int | Sequence[int]:
+        return self if isinstance(index, slice) else int(self._clock.now().nanoseconds)
 
 
 class Watch:
@@ -50,6 +72,7 @@ class Watch:
         self._settings = settings
         self._subscriptions: list[Any] = []
         self._log, self._bench = log, bench
+        self._arrival = Arrival(node)
         self._topics = self._publish(diagnostics)
         self._shown_channels = machine.table.channels
         self._rivals: tuple[str, ...] = ()
@@ -182,19 +205,14 @@ class Watch:
         taken_in = inlet(
             name, topic, self.monitor, log=self._log.write,
             rotor_joint=self._settings.value(f'{self.name}.rotor_joint'))
-        receive = self._receive_bare if kind == FLOAT64 else self._receive_stamped
         self._subscriptions.append(self._node.create_subscription(
-            TYPES[kind], topic, partial(receive, taken_in),
+            TYPES[kind], topic, partial(self._receive, taken_in),
             QoSProfile(depth=depth, reliability=reliability), raw=True))
         return topic
 
-    def _receive_stamped(self, taken_in: Inlet, cdr: bytes) -> None:
+    def _receive(self, taken_in: Inlet, cdr: bytes) -> None:
         if self.is_active:
-            taken_in(STAMPED, (cdr,))
-
-    def _receive_bare(self, taken_in: Inlet, cdr: bytes) -> None:
-        if self.is_active:
-            taken_in((self._node.get_clock().now().nanoseconds,), (cdr,))
+            taken_in(self._arrival, (cdr,))
 
     def _send(self, records: Records) -> None:
         if self.is_active:

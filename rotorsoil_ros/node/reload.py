@@ -1,13 +1,13 @@
 """How does a changed case file come into a running node? Aside, and then all at once."""
 
 from collections.abc import Callable
-from threading import Thread
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode
 from std_srvs.srv import Trigger
 
+from rotorsoil_ros.background import Errand
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import RotorSoilError
 
@@ -30,8 +30,7 @@ class Reloader:
     ) -> None:
         self._node, self._name = node, name
         self._check, self._load, self._take = check, load, take
-        self._thread: Thread | None = None
-        self._loaded: Machine | RotorSoilError | OSError | None = None
+        self._errand: Errand[Machine] | None = None
         self._timer = node.create_timer(
             GLANCE_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
@@ -44,7 +43,7 @@ class Reloader:
 
     def _serve(self, request: Any, response: Any) -> Any:
         del request
-        if self._thread is not None:
+        if self._errand is not None:
             response.message = f'{self._name}: a reload is under way'
             return response
         try:
@@ -52,26 +51,23 @@ class Reloader:
         except (RotorSoilError, OSError) as error:
             response.message = f'{error}; the old case stays'
             return response
-        self._thread = Thread(target=self._work, name=f'reload {self._name}', daemon=True)
-        self._thread.start()
+        errand = Errand(self._load, name=f'reload {self._name}')
+        if not errand.has_begun:
+            response.message = f'{errand.failure}; the old case stays'
+            return response
+        self._errand = errand
         self._timer.reset()
         response.success = True
         response.message = f'~/{self._name}/model will tell when the new case answers'
         return response
 
-    def _work(self) -> None:
-        try:
-            self._loaded = self._load()
-        except (RotorSoilError, OSError) as error:
-            self._loaded = error
-
     def _look(self) -> None:
-        """Swap what the thread has loaded."""
-        if self._thread is None or self._thread.is_alive():
+        """Swap what was loaded."""
+        if self._errand is None or not self._errand.is_done:
             return
-        loaded, self._loaded, self._thread = self._loaded, None, None
+        errand, self._errand = self._errand, None
         self._timer.cancel()
-        if isinstance(loaded, Machine):
-            self._node.get_logger().info(self._take(loaded))
+        if errand.result is not None:
+            self._node.get_logger().info(self._take(errand.result))
         else:
-            self._node.get_logger().error(f'{loaded}; the old case stays')
+            self._node.get_logger().error(f'{errand.failure}; the old case stays')

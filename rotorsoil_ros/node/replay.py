@@ -16,7 +16,8 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.profile import is_input, tells_speed
+from rotorsoil_ros.bags.profile import is_input, near_misses, tells_speed
+from rotorsoil_ros.bags.reader import CDR
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
@@ -65,12 +66,15 @@ def replay(
     """
     if not 0.0 < rate < float('inf'):
         raise InputError(f'rate must be > 0 and finite, got {rate:g}')
-    topics = bag_reader.topics(profile)
-    found = {topic: kind for topic, (kind, number) in topics.items()
-             if number and is_input(topic, kind)}
+    sources = {source: number for source, number in bag_reader.sources(profile).items()
+               if number}
+    found = {source.topic: source.type for source in sources
+             if source.encoding == CDR and is_input(source.topic, source.type)}
     if not any(tells_speed(topic, kind) for topic, kind in found.items()):
-        raise InputError(f'{profile}: tells no speed on joint_states or rotor/speed')
-    total = sum(topics[topic][1] for topic in found)
+        missed = ''.join(f'; {miss}' for miss in near_misses(sources))
+        raise InputError(f'{profile}: tells no speed on joint_states or rotor/speed{missed}')
+    total = sum(number for source, number in sources.items()
+                if found.get(source.topic) == source.type)
     with ExitStack() as stack:
         if context is None:
             context = Context()

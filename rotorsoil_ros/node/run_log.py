@@ -10,11 +10,11 @@ from urllib.parse import urlsplit
 
 from rotorsoil_ros.background import Aside
 from rotorsoil_ros.bags.recorder import BagAside, Recorder
-from rotorsoil_ros.bags.retention import Recovery
-from rotorsoil_ros.bags.writer import new_directory
+from rotorsoil_ros.bags.retention import new_directory
+from rotorsoil_ros.bags.unfinished import Recovery
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import Diagnostics, Event, Expected, Model
+from rotorsoil_ros.events import Diagnostics, Event
 from rotorsoil_ros.screen import open_viewer
 from rotorsoil_ros.wire.messages import Records
 
@@ -54,23 +54,30 @@ class RunLog:
         self, settings: LogSettings, machines: Mapping[str, Machine], *, tell: Tell,
         complain: Tell,
     ) -> None:
-        self.path: Path | None = None
+        self._settings = settings
         self._complain = complain
         self._bag: BagAside | None = None
         self._recovery: Recovery | None = None
         self._viewer: Aside[Event | Path] | None = None
-        self._shown_file: Path | None = None
-        if settings.directory and (settings.mcap or settings.rerun):
-            directory = Path(settings.directory).expanduser()
-            self.path = new_directory(directory, settings.name)
+        self._alone: Path | None = None  # directory of a recording without a bag
+        self._directory = directory = _directory(settings)
+        if directory is not None:
             self._recovery = Recovery(directory, tell=tell, complain=complain)
-        if self.path and settings.mcap:
+        if directory is not None and settings.mcap:
             self._bag = BagAside(Recorder(
-                self.path, split_mib=settings.split_mib, split_s=settings.split_s,
+                directory, settings.name, split_mib=settings.split_mib, split_s=settings.split_s,
                 budget_mib=settings.budget_mib, tell=tell, complain=complain), complain=complain)
-            self._shown_file = self._bag.file if settings.rerun else None
-        if (self.path and settings.rerun) or settings.rerun_url:
-            self._viewer = self._open_viewer(settings, machines)
+        else:
+            self._make_alone(complain)
+        self._shown_file = self._bag.file if self._bag is not None else None
+        self._viewer = self._open_viewer(machines)
+
+    @property
+    def path(self) -> Path | None:
+        """Directory of the log, if there is one."""
+        if self._bag is not None:
+            return self._bag.path
+        return self._alone
 
     @property
     def is_written(self) -> bool:
@@ -102,6 +109,8 @@ class RunLog:
         if self._bag is not None:
             self._bag.flush(wait_s=wait_s)
             self._follow(self._bag.file)
+        elif self._make_alone(lambda text: None) and self._alone and self._viewer:
+            self._viewer.put([self._alone / f'{self._alone.name}.rrd'])
         if self._viewer is not None:
             self._viewer.flush()
         if self._recovery is not None:
@@ -123,57 +132,61 @@ class RunLog:
         if viewer is not None:
             viewer.close()
 
-    def _follow(self, file: Path) -> None:
+    def _make_alone(self, complain: Tell) -> bool:
+        """Make a directory for a recording without a bag, unless there is one."""
+        if self._directory is None or self._alone is not None:
+            return False
+        try:
+            self._alone = new_directory(self._directory, self._settings.name)
+        except OSError as error:
+            complain(f'log {self._directory / self._settings.name} cannot be begun and is tried '
+                     f'again: {error.strerror}')
+            return False
+        return True
+
+    def _follow(self, file: Path | None) -> None:
         """Begin a recording of the viewer beside each new file of the bag."""
-        if self._viewer is None or self._shown_file in (None, file):
+        if not self._settings.rerun or self._viewer is None or file in (None, self._shown_file):
             return
         # Before what was collected: the file began when the second before was put onto the disk.
-        if self._viewer.put([file.with_suffix('.rrd')]):
+        if file is not None and self._viewer.put([file.with_suffix('.rrd')]):
             self._shown_file = file
 
-    def _open_viewer(
-        self, settings: LogSettings, machines: Mapping[str, Machine],
-    ) -> Aside[Event | Path] | None:
-        recording = self.path / f'{self.path.name}.rrd' if self.path and settings.rerun else None
+    def _open_viewer(self, machines: Mapping[str, Machine]) -> Aside[Event | Path] | None:
+        settings, path = self._settings, self.path
+        recording = path / f'{path.name}.rrd' if path and settings.rerun else None
         url = settings.rerun_url
         if url and not listens(url):
             self._complain(f'nobody listens at {url}: the run is not shown live')
             url = ''
-        if recording is None and not url:
+        if not url and not (settings.rerun and settings.directory):
             return None
         try:
-            show = Show(partial(open_viewer, machines=machines, url=url), recording)
-        except InputError as error:
+            sink = open_viewer(recording, machines, url=url)
+        except (InputError, OSError, RuntimeError) as error:
             self._complain(str(error))
             return None
-        return Aside(show.take, show.close, complain=self._complain)
+        return Aside(partial(_show, sink), sink.close, complain=self._complain)
 
 
-class Show:
-    """What the viewer shows, in one recording after the other: each is bounded as its bag is."""
+def _show(sink: 'RerunSink', batch: list[Event | Path]) -> None:
+    """Show events; at a path go on in a new recording, which is bounded as its bag is."""
+    for item in batch:
+        if isinstance(item, Path):
+            sink.begin(item)
+        else:
+            sink(item)
+    sink.flush()
 
-    def __init__(self, begin: 'Callable[[Path | None], RerunSink]', first: Path | None) -> None:
-        self._begin = begin
-        self._sink = begin(first)
-        self._basis: dict[tuple[str, type], Model | Expected] = {}
 
-    def take(self, batch: list[Event | Path]) -> None:
-        """Show events; at a path go on in a new recording."""
-        for item in batch:
-            if isinstance(item, Path):
-                self._sink.close()
-                self._sink = self._begin(item)
-                for basis in self._basis.values():  # on which what follows rests
-                    self._sink(basis)
-                continue
-            if isinstance(item, (Model, Expected)):
-                self._basis[item.machine, type(item)] = item
-            self._sink(item)
-        self._sink.flush()
-
-    def close(self) -> None:
-        """Finish the last recording."""
-        self._sink.close()
+def _directory(settings: LogSettings) -> Path | None:
+    """Return where to log, if that is asked for."""
+    if not settings.directory or not (settings.mcap or settings.rerun):
+        return None
+    try:
+        return Path(settings.directory).expanduser()
+    except RuntimeError as error:
+        raise InputError(f'log.directory: {settings.directory}: {error}') from error
 
 
 def listens(url: str) -> bool:

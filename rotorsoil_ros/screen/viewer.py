@@ -48,18 +48,33 @@ class RerunSink:
         self, path: Path | None, machines: Mapping[str, Machine], *, url: str = '',
     ) -> None:
         self._stream = rr.RecordingStream(APPLICATION)
-        shown = {name: Shown(name, machine.case,
-                             trends(name, machine.case, machine.table.channels),
-                             Scene(machine.case, machine.table.channels))
-                 for name, machine in machines.items()}
-        # A footer would keep two kilobytes in memory for every chunk until the end.
-        file = [rr.FileSink(path, write_footer=False)] if path else []
-        viewer = [rr.GrpcSink(url)] if url else []
-        self._stream.set_sinks(*file, *viewer, default_blueprint=blueprint(shown))
-        recording = Recording(self._stream)
-        self._views = {name: MachineView(recording, shown[name], machine)
+        self._machines, self._url = machines, url
+        self._shown = {name: Shown(name, machine.case,
+                                   trends(name, machine.case, machine.table.channels),
+                                   Scene(machine.case, machine.table.channels))
                        for name, machine in machines.items()}
         self._held_ns = 0 if url else HELD_NS
+        self._basis: dict[tuple[str, type], Model | Expected] = {}
+        self._views: dict[str, MachineView] = {}
+        self.begin(path)
+
+    def begin(self, path: Path | None) -> None:
+        """Send what was collected, and go on in a new file that is whole in itself."""
+        # The stream stays: rerun never frees one, nor its two threads.
+        for view in self._views.values():
+            view.flush()
+        # A footer would keep two kilobytes in memory for every chunk until the end.
+        file = [rr.FileSink(path, write_footer=False)] if path else []
+        viewer = [rr.GrpcSink(self._url)] if self._url else []
+        if not file and not viewer:  # the disk takes none yet: rerun would keep all in memory
+            self._views = {}
+            return
+        self._stream.set_sinks(*file, *viewer, default_blueprint=blueprint(self._shown))
+        recording = Recording(self._stream)
+        self._views = {name: MachineView(recording, self._shown[name], machine)
+                       for name, machine in self._machines.items()}
+        for basis in self._basis.values():  # on which what follows rests
+            self(basis)
 
     def __enter__(self) -> 'RerunSink':
         return self
@@ -72,7 +87,10 @@ class RerunSink:
 
     def __call__(self, event: Event) -> None:
         """Collect an event."""
-        self._views[event.machine].take(event)
+        if isinstance(event, (Model, Expected)):
+            self._basis[event.machine, type(event)] = event
+        if view := self._views.get(event.machine):
+            view.take(event)
 
     def show(self, events: Iterable[Event]) -> None:
         """Collect events and send them."""

@@ -297,10 +297,10 @@ class Accelerations:
     is_synthetic: bool
 
 
-Decoded = TypeVar('Decoded')
+Decoded = TypeVar('Decoded', bound=JointStates | Accelerations)
 
 
-class _Reader(Generic[Decoded]):
+class Reader(Generic[Decoded]):
     """Decodes messages as they come: one publisher keeps its layout, so that it is read once."""
 
     def __init__(
@@ -325,14 +325,14 @@ class _Reader(Generic[Decoded]):
         return self._layout
 
 
-class JointStateReader(_Reader[JointStates]):
+class JointStateReader(Reader[JointStates]):
     """Decodes JointStates."""
 
     def __init__(self) -> None:
         super().__init__(JOINT_STATE, joint_states)
 
 
-class ImuReader(_Reader[Accelerations]):
+class ImuReader(Reader[Accelerations]):
     """Decodes samples of accelerometers."""
 
     def __init__(self) -> None:

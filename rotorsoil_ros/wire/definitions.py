@@ -77,6 +77,12 @@ def type_hash(message_type: str) -> str:
     return f'RIHS01_{known}' if known else ''
 
 
+def ros_name(name: str) -> str:
+    """Return a type as ROS 2 names it; DDS says `p::msg::dds_::T_`, ROS 1 and old tools `p/T`."""
+    package, *_, kind = re.split('::|/', name) if name else ('', '')
+    return f'{package}/msg/{kind.rstrip("_")}' if package else name
+
+
 @cache
 def compound(message_type: str) -> Compound:
     """Return the fields of a type."""

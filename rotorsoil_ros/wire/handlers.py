@@ -1,18 +1,30 @@
 """How do messages that come in, from the graph or from a bag, reach the monitor of a machine."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 import math
 import re
 import struct
-from typing import NamedTuple, TypeAlias
+from typing import Generic, NamedTuple, TypeAlias
 
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import Channel, named
-from rotorsoil_ros.events import LAST_STAMP, Measured, Samples
+from rotorsoil_ros.events import LAST_STAMP, Measured, NANOSECONDS, Samples
 from rotorsoil_ros.monitor.monitor import Monitor
-from rotorsoil_ros.wire.cdr import AXES, BODY, ImuReader, JointStateReader, Layout, LITTLE_ENDIAN
+from rotorsoil_ros.wire.cdr import (
+    Accelerations,
+    AXES,
+    BODY,
+    Decoded,
+    ImuReader,
+    JointStateReader,
+    JointStates,
+    Layout,
+    LITTLE_ENDIAN,
+    Reader,
+)
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
 from rotorsoil_ros.wire.messages import Records
 
@@ -20,7 +32,8 @@ SPEED_TOPICS = {'joint_states': JOINT_STATE, 'rotor/speed': FLOAT64}
 MEASURED_TOPICS = {'measured/amplitude': JOINT_STATE, 'measured/phase': JOINT_STATE}
 TOPICS = SPEED_TOPICS | MEASURED_TOPICS
 ROTOR_JOINT = 'rotor'
-UNREAD = ('malformed', 'joint_missing')  # of no use, not even for the log
+YEAR_S = 31_556_952
+LONGEST_NS = 10 * YEAR_S * NANOSECONDS  # that any log spans: what is further off is no time
 
 RAW_NAME = re.compile(r'measured/(\w+)/imu')
 
@@ -42,23 +55,53 @@ class Speeds(NamedTuple):
     angle: FloatArray
 
 
+class Dating:
+    """
+    Decides at which time stamped messages count: at their own, or at that of their reception.
+
+    A stamp of zero was never set, and one that is years from the last one and from the time of
+    reception is none: both are dated on reception, and counted. Where the reception has no time
+    either, there is none.
+    """
+
+    def __init__(self, note: Note) -> None:
+        self._note = note
+        self._last_ns: int | None = None
+
+    def date(self, stamp_ns: int, received_ns: Sequence[int], row: int) -> int | None:
+        """Return the time of a message [ns]; its reception is asked for only if it matters."""
+        last = self._last_ns
+        if last is None or not stamp_ns or abs(stamp_ns - last) > LONGEST_NS:
+            received = received_ns[row]
+            is_far = received and abs(stamp_ns - received) > LONGEST_NS
+            if not stamp_ns or is_far:
+                if not received:
+                    self._note('stamp_missing', 1)
+                    return None
+                self._note('stamp_far_off' if stamp_ns else 'stamp_not_set', 1)
+                stamp_ns = received
+        self._last_ns = stamp_ns
+        return stamp_ns
+
+
 class SpeedReader:
     """Reads the speeds of one topic; what it cannot read it counts by its reason."""
 
     def __init__(self, message_type: str, *, rotor_joint: str, note: Note) -> None:
-        self._read = _read_float if message_type == FLOAT64 else JointSpeed(rotor_joint).read
+        self._read = (_read_float if message_type == FLOAT64
+                      else JointSpeed(rotor_joint, Dating(note)).read)
         self._note = note
 
     def read(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> Speeds:
         """Read messages that were received at the given times [ns]."""
         if len(cdrs) == 1:
-            return self._read_one(received_ns[0], cdrs)
+            return self._read_one(received_ns, cdrs)
         messages, stamps, speeds, angles = [], [], [], []
-        for received, cdr in zip(received_ns, cdrs, strict=True):
-            stamp, speed, angle, fault = self._read(received, cdr)
+        for row, cdr in enumerate(cdrs):
+            stamp, speed, angle, fault = self._read(received_ns, row, cdr)
             if fault:
                 self._note(fault, 1)
-            if fault not in UNREAD:
+            if stamp is not None:
                 messages.append(cdr)
                 stamps.append(stamp)
                 speeds.append(speed)
@@ -66,45 +109,48 @@ class SpeedReader:
         return Speeds(messages, stamps, np.array(speeds, dtype=float),
                       np.array(angles, dtype=float))
 
-
-    def _read_one(self, received_ns: int, cdrs: Sequence[bytes]) -> Speeds:
+    def _read_one(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> Speeds:
         """Read what a live node hears: the same as many, with less ado."""
-        stamp, speed, angle, fault = self._read(received_ns, cdrs[0])
+        stamp, speed, angle, fault = self._read(received_ns, 0, cdrs[0])
         if fault:
             self._note(fault, 1)
-            if fault in UNREAD:
-                return NOTHING
+        if stamp is None:
+            return NOTHING
         return Speeds(cdrs, (stamp,), np.array((speed,)), np.array((angle,)))
 
 
 NOTHING = Speeds((), (), np.array([]), np.array([]))
 
+# Stamp [ns], or None where the message is of no use; speed [rad/s]; angle [rad]; fault.
+Told: TypeAlias = tuple[int | None, float, float, str]
+
 
 class JointSpeed:
     """Finds the velocity of one joint in JointStates, one by one."""
 
-    def __init__(self, joint: str) -> None:
+    def __init__(self, joint: str, dating: Dating) -> None:
         self._joint = joint
+        self._dating = dating
         self._reader = JointStateReader()
         self._layout: Layout | None = None
-        self._fault = ''
+        self._fault = 'malformed'  # of a message without a layout
         self._unpack = struct.Struct('<d').unpack_from
         self._at = self._angle_at = 0
 
-    def read(self, received_ns: int, cdr: bytes) -> tuple[int, float, float, str]:
-        """Return stamp [ns], speed [rad/s], angle [rad] and fault; the stamp is its own."""
-        del received_ns
+    def read(self, received_ns: Sequence[int], row: int, cdr: bytes) -> Told:
+        """Return what the message of a row tells, at its own stamp if that can be one."""
         layout = self._reader.layout(cdr)
         if layout is not self._layout:
             self._learn(layout)
         if layout is None or self._fault == 'joint_missing':
-            return 0, math.nan, math.nan, self._fault
+            return None, math.nan, math.nan, self._fault
         stamp = layout.stamp_ns(cdr)
         if not 0 <= stamp <= LAST_STAMP:
-            return 0, math.nan, math.nan, 'malformed'
+            return None, math.nan, math.nan, 'malformed'
+        dated = self._dating.date(stamp, received_ns, row)
         angle = self._unpack(cdr, self._angle_at)[0] if self._angle_at else math.nan
         speed = math.nan if self._fault else self._unpack(cdr, self._at)[0]
-        return stamp, speed, angle, self._fault
+        return dated, speed, angle, self._fault
 
     def _learn(self, layout: Layout | None) -> None:
         """Find out where in such messages the velocity is, or why it is not there."""
@@ -123,12 +169,12 @@ class JointSpeed:
             self._unpack = struct.Struct(layout.order + 'd').unpack_from
 
 
-def _read_float(received_ns: int, cdr: bytes) -> tuple[int, float, float, str]:
-    """Return stamp [ns], speed [rad/s], no angle and fault of a Float64, dated on receipt."""
+def _read_float(received_ns: Sequence[int], row: int, cdr: bytes) -> Told:
+    """Return what a Float64 tells, dated on receipt; it knows of no angle."""
     if len(cdr) < BODY + 8 or cdr[0] != 0 or cdr[1] > LITTLE_ENDIAN:
-        return 0, math.nan, math.nan, 'malformed'
+        return None, math.nan, math.nan, 'malformed'
     order = '<d' if cdr[1] == LITTLE_ENDIAN else '>d'
-    return received_ns, struct.unpack_from(order, cdr, BODY)[0], math.nan, ''
+    return received_ns[row], struct.unpack_from(order, cdr, BODY)[0], math.nan, ''
 
 
 class SpeedInlet:
@@ -153,17 +199,60 @@ class SpeedInlet:
                 np.array(speeds.stamps, dtype=np.int64), speeds.speed, speeds.angle)
 
 
-class MeasuredInlet:
-    """Tells the monitor amplitudes or phases that were measured, and logs them as they came."""
+class StampedInlet(Generic[Decoded]):
+    """
+    Dates stamped messages, logs them as they came, and tells what they say.
 
-    def __init__(self, topic: str, quantity: str, monitor: Monitor, *, log: Outlet) -> None:
-        self._topic = topic
-        self._quantity = quantity
-        self._monitor = monitor
-        self._log = log
-        self._reader = JointStateReader()
+    Parameters
+    ----------
+    topic, message_type : str
+        Under which they are logged.
+    reader : Reader
+        What decodes them.
+    tell : callable
+        Takes times (n,) [ns], what was decoded, and which n of its rows have these times.
+
+    """
+
+    def __init__(
+        self, topic: str, message_type: str, reader: Reader[Decoded],
+        tell: Callable[[IntArray, Decoded, Sequence[int]], None], *, note: Note, log: Outlet,
+    ) -> None:
+        self._topic, self._type = topic, message_type
+        self._reader, self._tell = reader, tell
+        self._note, self._log = note, log
+        self._dating = Dating(note)
+
+    def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
+        """Take in messages; their own stamps count, where they are set."""
+        at = 0
+        for messages, decoded in self._reader.runs(cdrs):
+            received, at = received_ns[at:at + len(messages)], at + len(messages)
+            if decoded is None or not are_stamps(decoded.stamp_ns):
+                self._note('malformed', len(messages))
+                continue
+            times = [(row, time) for row, stamp in enumerate(decoded.stamp_ns.tolist())
+                     if (time := self._dating.date(stamp, received, row)) is not None]
+            if times:
+                rows, stamps = zip(*times, strict=True)
+                self._log(Records(self._topic, self._type, stamps,
+                                  [messages[row] for row in rows]))
+                self._tell(np.array(stamps, dtype=np.int64), decoded, list(rows))
+
+
+class _Vectors:
+    """Tells a monitor amplitudes or phases that were measured."""
+
+    def __init__(self, monitor: Monitor, quantity: str) -> None:
+        self._monitor, self._quantity = monitor, quantity
         self._named: tuple[object, ...] = ()
         self._channels: tuple[Channel, ...] = ()
+
+    def __call__(self, stamp_ns: IntArray, states: JointStates, rows: Sequence[int]) -> None:
+        """Tell some rows of what was decoded."""
+        self._monitor.on_measured(Measured(
+            self._monitor.machine, self._quantity, stamp_ns, self._known(states.names),
+            states.position[rows], states.velocity[rows]))
 
     def _known(self, names: tuple[str, ...]) -> tuple[Channel, ...]:
         """Return the channels of names; a sensor repeats them with every message."""
@@ -173,39 +262,15 @@ class MeasuredInlet:
             self._channels = tuple(named(name, table.channels) for name in names)
         return self._channels
 
-    def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
-        """Take in messages; their own stamps count, not when they were received."""
-        for messages, states in self._reader.runs(cdrs):
-            if states is None or not are_stamps(states.stamp_ns):
-                self._monitor.health.note('malformed', len(messages))
-                continue
-            self._log(Records(self._topic, JOINT_STATE, states.stamp_ns.tolist(), messages))
-            self._monitor.on_measured(Measured(
-                self._monitor.machine, self._quantity, states.stamp_ns,
-                self._known(states.names),
-                states.position, states.velocity))
 
-
-class SampleInlet:
-    """Tells the monitor raw samples of one channel, and logs them as they came."""
-
-    def __init__(self, topic: str, channel: Channel, monitor: Monitor, *, log: Outlet) -> None:
-        self._topic, self._channel = topic, channel
-        self._monitor = monitor
-        self._log = log
-        self._reader = ImuReader()
-        self._axis = AXES.index(channel.axis)
-
-    def __call__(self, received_ns: Sequence[int], cdrs: Sequence[bytes]) -> None:
-        """Take in messages; their own stamps count, not when they were received."""
-        for messages, samples in self._reader.runs(cdrs):
-            if samples is None or not are_stamps(samples.stamp_ns):
-                self._monitor.health.note('malformed', len(messages))
-                continue
-            self._log(Records(self._topic, IMU, samples.stamp_ns.tolist(), messages))
-            self._monitor.on_samples(Samples(
-                self._monitor.machine, self._channel, samples.stamp_ns,
-                samples.acceleration[:, self._axis], samples.is_synthetic))
+def _tell_samples(
+    monitor: Monitor, channel: Channel, stamp_ns: IntArray, samples: Accelerations,
+    rows: Sequence[int],
+) -> None:
+    """Tell raw samples of one channel."""
+    monitor.on_samples(Samples(
+        monitor.machine, channel, stamp_ns,
+        samples.acceleration[rows, AXES.index(channel.axis)], samples.is_synthetic))
 
 
 def are_stamps(stamp_ns: IntArray) -> bool:
@@ -238,7 +303,11 @@ def inlet(name: str, topic: str, monitor: Monitor, *, rotor_joint: str, log: Out
 
     """
     if channel := raw_channel(name):
-        return SampleInlet(topic, channel, monitor, log=log)
+        return StampedInlet(topic, IMU, ImuReader(), partial(_tell_samples, monitor, channel),
+                            note=monitor.health.note, log=log)
     if name in SPEED_TOPICS:
         return SpeedInlet(topic, SPEED_TOPICS[name], monitor, rotor_joint=rotor_joint, log=log)
-    return MeasuredInlet(topic, name.removeprefix('measured/'), monitor, log=log)
+    quantity = name.removeprefix('measured/')
+    return StampedInlet(topic, JOINT_STATE, JointStateReader(),
+                        _Vectors(monitor, quantity),
+                        note=monitor.health.note, log=log)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from rotorsoil_ros.bags.writer import BagWriter, new_directory
+from rotorsoil_ros.bags.retention import new_directory
+from rotorsoil_ros.bags.writer import BagWriter
 
 
 @pytest.fixture

@@ -22,6 +22,8 @@ from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.cdr import joint_states, Layout
 from rotorsoil_ros.wire.definitions import FLOAT64, JOINT_STATE, STRING
 
+from records import topics_of
+
 STORE = get_typestore(Stores.ROS2_JAZZY)
 START = 1_700_000_000_000_000_001
 REFERENCE = Path(__file__).parents[1] / 'reference'
@@ -48,7 +50,7 @@ def test_a_written_profile_is_read_back_to_the_bit_and_the_nanosecond(tmp_path):
     stamps = START + 10**6 * np.arange(5000)
     speeds = np.random.default_rng(0).uniform(0.0, 900.0, 5000)
     write_speed_profile(tmp_path / 'p.mcap', 'fan', stamps, speeds)
-    assert bag_reader.topics(tmp_path / 'p.mcap') == {'/fan/joint_states': (JOINT_STATE, 5000)}
+    assert topics_of(tmp_path / 'p.mcap') == {'/fan/joint_states': (JOINT_STATE, 5000)}
     found_stamps, found_speeds = read(tmp_path / 'p.mcap')
     assert found_stamps.tolist() == stamps.tolist()
     assert found_speeds.tobytes() == speeds.tobytes()

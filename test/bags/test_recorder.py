@@ -9,9 +9,9 @@ import shutil
 import pytest
 import yaml
 
-from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.recorder import Recorder
-from rotorsoil_ros.bags.writer import new_directory
+from rotorsoil_ros.bags.retention import MARKER
 from rotorsoil_ros.events import Level
 
 from records import joint_records, read_all, START, string_records
@@ -25,7 +25,7 @@ class Desk:
     def __init__(self, directory, **options):
         self.told, self.complaints, self.second = [], [], 0
         settings = {'split_mib': 0.0, 'split_s': 0.0, 'budget_mib': 0.0} | options
-        self.recorder = Recorder(new_directory(directory, 'run'), tell=self.told.append,
+        self.recorder = Recorder(directory, 'run', tell=self.told.append,
                                  complain=self.complaints.append, **settings)
 
     def pass_second(self, count=100):
@@ -72,7 +72,7 @@ def test_a_full_disk_costs_a_gap_that_is_told_once_and_written_down(desk, tmp_pa
     assert (report.level, report.values['lost'], report.values['gaps']) == (Level.OK, 400, 1)
     desk.recorder.close()
     assert len(desk.complaints) == len(desk.told) == 1
-    assert [file.name for file in bag_reader.files(tmp_path / 'run')] == [
+    assert [file.name for file in bag_files(tmp_path / 'run')] == [
         'run_0.mcap', 'run_1.mcap']  # the first one could even be finished
     stamps = [time for _, time, _ in read_all(tmp_path / 'run')]
     assert len(stamps) == 200
@@ -153,7 +153,7 @@ def test_a_disk_that_stays_full_collects_no_litter(desk, tmp_path, full_disk):
     full_disk(None)
     assert sorted(path.name for path in tmp_path.iterdir()) == ['run']
     assert sorted(path.name for path in (tmp_path / 'run').iterdir()) == [
-        'metadata.yaml', 'run_0.mcap']
+        MARKER, 'metadata.yaml', 'run_0.mcap']
 
 
 @pytest.mark.skipif(not Path('/dev/full').exists(), reason='there is no device that is full')
@@ -171,7 +171,7 @@ def test_the_budget_splits_and_removes_the_oldest_files_of_a_long_run(tmp_path):
     for _ in range(60):
         desk.pass_second(400)
     desk.recorder.close()
-    files = bag_reader.files(tmp_path / 'run')
+    files = bag_files(tmp_path / 'run')
     assert set(files) == set((tmp_path / 'run').glob('*.mcap'))
     assert 2 < len(files) < 12
     size = sum(file.stat().st_size for file in files)
@@ -188,7 +188,7 @@ def test_the_index_of_an_endless_file_takes_bounded_memory(desk, tmp_path, monke
     assert desk.recorder._bag._file.index_size < 1200
     desk.recorder.close()
     assert len(read_all(tmp_path / 'run')) == 50
-    assert len(bag_reader.files(tmp_path / 'run')) > 3
+    assert len(bag_files(tmp_path / 'run')) > 3
 
 
 def test_errno_is_told_in_words(desk, monkeypatch):

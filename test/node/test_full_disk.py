@@ -11,9 +11,11 @@ from sensor_msgs.msg import JointState
 import yaml
 
 from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.recover import recover
 
 from graphs import DEADLINE_S, speak, stamp_ns
+from records import topics_of
 
 AMPLITUDE = '/rotorsoil/fan/amplitude'
 DISK_MIB = 2
@@ -59,7 +61,7 @@ def test_a_disk_that_is_full_is_logged_to_again_when_there_is_room(start, graph,
     assert told.count('No space left on device') == 2  # it failed; it goes on without ...
     assert 'Traceback' not in told
     bag = disk / 'run'
-    first, second = bag_reader.files(bag)
+    first, second = bag_files(bag)
     logged = [time for source, time, _ in bag_reader.messages(
         bag, lambda topic, _: topic == AMPLITUDE)]
     assert logged == sorted(set(logged))
@@ -69,9 +71,9 @@ def test_a_disk_that_is_full_is_logged_to_again_when_there_is_room(start, graph,
     with AnyReader([bag]) as reader:
         assert sum(1 for connection, _, _ in reader.messages()
                    if connection.topic == AMPLITUDE) == len(logged)
-    assert bag_reader.topics(second)['/rotorsoil/fan/model'][1] == 1
+    assert topics_of(second)['/rotorsoil/fan/model'][1] == 1
     saved = recover(first, tmp_path / 'saved.mcap')
-    assert saved.messages == sum(number for _, number in bag_reader.topics(first).values())
+    assert saved.messages == sum(number for _, number in topics_of(first).values())
     information = yaml.safe_load((bag / 'metadata.yaml').read_text())
     gap = information['rosbag2_bagfile_information']['custom_data']['gap_1']
     assert gap.endswith('No space left on device')

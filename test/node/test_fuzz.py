@@ -28,6 +28,8 @@ from rotorsoil_ros.wire.cdr import JointStateReader
 from rotorsoil_ros.wire.handlers import inlet, TOPICS
 from rotorsoil_ros.wire.messages import Encoder, Topics
 
+from records import topics_of
+
 DISC = Channel('disc_1', '', 'x')
 MANY = settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
 SOME = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -153,7 +155,7 @@ def test_any_bytes_behind_the_magic_are_refused_in_one_line(tmp_path, content):
     path, out = tmp_path / 'fuzz.mcap', tmp_path / 'out.mcap'
     path.write_bytes(MAGIC + content + MAGIC)
     with pytest.raises(InputError) as caught:
-        bag_reader.topics(path)
+        topics_of(path)
     assert '\n' not in str(caught.value)
     with suppress(InputError):
         list(bag_reader.messages(path, lambda *_: True))

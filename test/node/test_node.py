@@ -19,10 +19,10 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
-from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.case.config import load
 
 from graphs import assert_answers, exact, joint_state, LATCHED, STAMP, stamp_ns
+from records import topics_of
 
 
 def test_a_speed_is_answered_with_the_bits_of_the_table_and_its_own_stamp(bench, machine):
@@ -292,5 +292,5 @@ def test_remapped_topics_are_heard_answered_and_logged_under_their_new_names(ben
     publish(joint_state([300.0]))
     bench.graph.until(lambda: phase, 'the answer')
     node.release()
-    topics = bag_reader.topics(tmp_path / 'run')
+    topics = topics_of(tmp_path / 'run')
     assert {'/plant/turbine', '/angle', '/rotorsoil/fan/amplitude'} <= set(topics)

@@ -24,6 +24,7 @@ from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 from graphs import DEADLINE_S
+from records import topics_of
 
 FAN = Path('config/plant_fan.yaml')
 START = 1_700_000_000_000_000_001
@@ -192,5 +193,5 @@ def test_sensors_are_heard_from_their_first_sample_on(graph, tmp_path, cache):
     counts = node._watches[0].monitor.health.counts
     graph.until(lambda: replaying.is_done() and counts['samples'] == 8000, 'every sample')
     node.release()
-    wanted, found = bag_reader.topics(source), bag_reader.topics(tmp_path / 'run')
+    wanted, found = topics_of(source), topics_of(tmp_path / 'run')
     assert {topic: found[topic] for topic in wanted} == wanted

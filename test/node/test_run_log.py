@@ -6,8 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from rotorsoil_ros.bags.retention import make_room
-from rotorsoil_ros.bags.writer import new_directory
+from rotorsoil_ros.bags.retention import make_room, new_directory
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 
 from graphs import DEADLINE_S
@@ -58,9 +57,11 @@ def test_old_recordings_of_the_bag_that_is_written_make_room_and_the_newest_stay
         (bag / name).write_bytes(bytes(100))
         os.utime(bag / name, (1e9 + age, 1e9 + age))
     removed = make_room(
-        tmp_path, 'run', budget=350, current=bag, keep=[bag / 'run_2.mcap'])
+        tmp_path, 'run', budget=350, current=bag, keep=bag / 'run_2.mcap',
+        complain=pytest.fail)
     assert [file.name for file in removed] == names[:3]
     removed = make_room(
-        tmp_path, 'run', budget=0, current=bag, keep=[bag / 'run_2.mcap'])
+        tmp_path, 'run', budget=0, current=bag, keep=bag / 'run_2.mcap',
+        complain=pytest.fail)
     assert [file.name for file in removed] == ['run_1.mcap']
     assert sorted(file.name for file in bag.iterdir()) == ['run_2.mcap', 'run_2.rrd']

@@ -1,6 +1,5 @@
 """The recording shows what an engineer looks for, at the time at which it happened."""
 
-from pathlib import Path
 import warnings
 
 import numpy as np
@@ -18,7 +17,7 @@ from rotorsoil_ros.events import (
     Zoned,
 )
 from rotorsoil_ros.monitor.criteria import Criteria
-from rotorsoil_ros.node.run_log import LogSettings, RunLog, Show
+from rotorsoil_ros.node.run_log import LogSettings, RunLog
 from rotorsoil_ros.screen import open_viewer
 
 from recordings import column, PERIOD, predicted, START
@@ -248,28 +247,9 @@ def test_without_rerun_the_reason_is_told(machine, tmp_path, monkeypatch):
         open_viewer(tmp_path / 'run.rrd', {'fan': machine})
 
 
-class Collected(list):
-    """What stands in for a recording: events as they were shown."""
-
-    __call__ = list.append
-
-    def flush(self):
-        """Do nothing: all is here."""
-
-    close = flush
-
-
-def test_a_new_recording_opens_with_the_models_that_it_rests_on():
-    made = []
-
-    def begin(path):
-        made.append(Collected([path]))
-        return made[-1]
-
-    show = Show(begin, None)
-    first, second, other = (Model(name, stamp, {}) for name, stamp in (
-        ('fan', 1), ('fan', 2), ('pump', 3)))
-    show.take([first, second, other])
-    show.take([Path('next.rrd'), Model('fan', 4, {})])
-    show.close()
-    assert made[1][:3] == [Path('next.rrd'), second, other]
+def test_a_new_recording_opens_with_the_models_that_it_rests_on(machine, tmp_path):
+    told = Model('fan', START, machine.description('fan', machine.case.unbalance))
+    with open_viewer(tmp_path / 'a.rrd', {'fan': machine}) as sink:
+        sink.show([told, predicted(machine, np.full(3, 300.0))])
+        sink.begin(tmp_path / 'b.rrd')
+        assert [event for event, _ in sink._views['fan']._moments] == [told]
