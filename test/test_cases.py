@@ -47,6 +47,9 @@ def test_what_was_left_out_is_told(predicted):
     _, said, _ = predicted(CASES / 'one_wrong_log_time' / 'rollover.mcap')
     assert '/paper_rotor/joint_states: 1 messages with an impossible time' in said.err
     assert '18446744073709551611 ns' in said.err
+
+
+def test_a_file_that_is_cut_off_is_told(predicted):
     _, said, _ = predicted(CASES / 'split_bag_cut_off' / 'split_cut')
     assert 'split_cut_2.mcap: was never finished' in said.err
 
