@@ -16,6 +16,7 @@ from rotorsoil_ros.case.zone_limits import ZoneLimits
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.comparison import Comparison, Run
 from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.health import REDATED
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.points import Collector
 from rotorsoil_ros.monitor.rules import Judging, Matching, Rules
@@ -168,7 +169,9 @@ class _Reading:
         elif any(self._unbalance(description) is None for _, description in self.descriptions):
             notes.append('the predictions in the log rest on another table than the case: the '
                          'case was asked anew, with its own unbalance')
-        return notes
+        notes += [f'{number} {reason.replace("_", " ")}: dated on reception'
+                  for reason in REDATED if (number := monitor.health.counts[reason])]
+        return notes + list(self.inputs.remarks)
 
     def _unbalance(self, description: Mapping[str, Any]) -> ComplexArray | None:
         """Return the unbalance that a node took, if it answered from the table of the case."""

@@ -1,8 +1,8 @@
 """One machine on the graph: its subscriptions, its monitor and its publishers."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from functools import partial
-from typing import Any, overload
+from typing import Any
 
 from rcl_interfaces.msg import Log
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
@@ -21,36 +21,13 @@ from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE, LOG, STRING
-from rotorsoil_ros.wire.handlers import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.handlers import Arrival, Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
 from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
 
 TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
 RAW_DEPTH = 1000  # samples kept while the node is busy
 OUTPUT = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-class Arrival(Sequence[int]):
-    """
-    When a message has come [ns].
-
-    Reading the clock takes 3 us, and most messages have their own stamp: it is read when asked.
-    """
-
-    def __init__(self, node: LifecycleNode) -> None:
-        self._clock = node.get_clock()
-
-    def __len__(self) -> int:
-        return 1
-
-    @overload
-    def __getitem__(self, index: int) -> int: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[int]: ...
-
-    def __getitem__(self, index: int | slice) -> int | Sequence[int]:
-        return self if isinstance(index, slice) else int(self._clock.now().nanoseconds)
 
 
 class Watch:
@@ -72,7 +49,7 @@ class Watch:
         self._settings = settings
         self._subscriptions: list[Any] = []
         self._log, self._bench = log, bench
-        self._arrival = Arrival(node)
+        self._arrival = Arrival(lambda: int(node.get_clock().now().nanoseconds))
         self._topics = self._publish(diagnostics)
         self._shown_channels = machine.table.channels
         self._rivals: tuple[str, ...] = ()

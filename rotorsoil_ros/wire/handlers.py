@@ -5,7 +5,7 @@ from functools import partial
 import math
 import re
 import struct
-from typing import Generic, NamedTuple, TypeAlias
+from typing import Generic, NamedTuple, overload, TypeAlias
 
 import numpy as np
 
@@ -55,13 +55,37 @@ class Speeds(NamedTuple):
     angle: FloatArray
 
 
+class Arrival(Sequence[int]):
+    """
+    When a message has come to a running node [ns].
+
+    Reading the clock takes 3 us, and most messages have their own stamp: it is read when asked.
+    """
+
+    def __init__(self, clock: Callable[[], int]) -> None:
+        self._clock = clock
+
+    def __len__(self) -> int:
+        return 1
+
+    @overload
+    def __getitem__(self, index: int) -> int: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[int]: ...
+
+    def __getitem__(self, index: int | slice) -> int | Sequence[int]:
+        return self if isinstance(index, slice) else self._clock()
+
+
 class Dating:
     """
     Decides at which time stamped messages count: at their own, or at that of their reception.
 
-    A stamp of zero was never set, and one that is years from the last one and from the time of
+    A stamp of zero was never set, and one that is years from those before and from the time of
     reception is none: both are dated on reception, and counted. Where the reception has no time
-    either, there is none.
+    either, there is none. A running node may follow another clock than its own from the first
+    message on, of a simulation or of a replay; in a log both times were written by one.
     """
 
     def __init__(self, note: Note) -> None:
@@ -71,17 +95,19 @@ class Dating:
     def date(self, stamp_ns: int, received_ns: Sequence[int], row: int) -> int | None:
         """Return the time of a message [ns]; its reception is asked for only if it matters."""
         last = self._last_ns
-        if last is None or not stamp_ns or abs(stamp_ns - last) > LONGEST_NS:
-            received = received_ns[row]
-            is_far = received and abs(stamp_ns - received) > LONGEST_NS
-            if not stamp_ns or is_far:
-                if not received:
-                    self._note('stamp_missing', 1)
-                    return None
-                self._note('stamp_far_off' if stamp_ns else 'stamp_not_set', 1)
-                stamp_ns = received
-        self._last_ns = stamp_ns
-        return stamp_ns
+        if stamp_ns and (isinstance(received_ns, Arrival) if last is None
+                         else abs(stamp_ns - last) <= LONGEST_NS):
+            self._last_ns = stamp_ns
+            return stamp_ns
+        received = received_ns[row]
+        if stamp_ns and abs(stamp_ns - received) <= LONGEST_NS:
+            self._last_ns = stamp_ns
+            return stamp_ns
+        if not received:
+            self._note('stamp_missing', 1)
+            return None
+        self._note('stamp_far_off' if stamp_ns else 'stamp_not_set', 1)
+        return received
 
 
 class SpeedReader:

@@ -1,6 +1,7 @@
 """Logs of the dead are recovered, those of the living are left alone, the oldest make room."""
 
 import os
+from pathlib import Path
 
 import pytest
 from rosbags.highlevel import AnyReader
@@ -120,3 +121,57 @@ def test_the_bag_of_another_living_node_makes_no_room(tmp_path):
         own = new_directory(tmp_path, 'run')
         assert make_room(tmp_path, 'run', budget=0, current=own, keep=None,
                          complain=refuse) == []
+
+
+def test_a_log_is_known_by_its_marker_over_restarts_and_not_by_its_name(tmp_path):
+    """A second log called `run` and the first one called `run_2` look the same but are not."""
+    own = [finished(tmp_path, 'run', age=age) for age in (50, 40, 30)]
+    other = finished(tmp_path, 'run_2', age=99)
+    assert [bag.name for bag in own] == ['run', 'run_2', 'run_3']
+    assert other.name == 'run_2_2'
+    kept = finished(tmp_path, 'run', age=98)
+    kept = kept.rename(tmp_path / 'keep_this')
+    for name in ('analysis.rrd', 'table.tmp', 'converted.mcap', 'run_9.mcap'):
+        (own[0] / name).write_text('precious')
+    living = BagWriter(new_directory(tmp_path, 'run'))
+    removed = make_room(tmp_path, 'run', budget=0, current=living.path, keep=living.file,
+                        complain=refuse)
+    living.close()
+    assert removed == own
+    assert sorted(file.name for file in own[0].iterdir()) == [
+        'analysis.rrd', 'converted.mcap', 'run_9.mcap', 'table.tmp']
+    assert [bag.exists() for bag in (*own[1:], other, kept)] == [False, False, True, True]
+
+
+def test_what_cannot_be_removed_is_told_and_the_rest_makes_room(tmp_path, monkeypatch):
+    old, new = finished(tmp_path, 'run', age=20), finished(tmp_path, 'run', age=10)
+    unlink = Path.unlink
+
+    def refused(path, **options):
+        if path.parent == old:
+            raise PermissionError(13, 'Permission denied')
+        unlink(path, **options)
+
+    monkeypatch.setattr(Path, 'unlink', refused)
+    told = []
+    assert make_room(tmp_path, 'run', budget=0, current=None, keep=None,
+                     complain=told.append) == [new]
+    assert f'{old}/run_0.mcap: cannot be removed to make room: Permission denied' in told
+    assert not new.exists()
+
+
+def test_a_recovered_file_that_the_metadata_does_not_know_is_described(killed, tmp_path):
+    """As when the node died after the recovery and before it wrote the metadata."""
+    said = (killed / 'metadata.yaml').read_text()
+    recover_all(tmp_path)
+    (killed / 'metadata.yaml').write_text(
+        said.replace('custom_data:', 'custom_data:\n    gap_1: x'))
+    assert recover_all(tmp_path) == ([], [])
+    known = yaml.safe_load((killed / 'metadata.yaml').read_text())
+    known = known['rosbag2_bagfile_information']
+    assert known['relative_file_paths'] == ['run_0.mcap', 'run_1_recovered.mcap']
+    assert known['custom_data']['gap_1'] == 'x'
+    (killed / 'metadata.yaml').unlink()
+    assert recover_all(tmp_path) == ([], [])
+    with AnyReader([killed]) as reader:
+        assert reader.message_count == 141

@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.events import Level
 
 from graphs import assert_answers, exact, joint_state, LATCHED, STAMP, stamp_ns
 from records import topics_of
@@ -218,8 +219,7 @@ def test_life_cycle_services_configure_silence_and_release(bench):
     ({'fan__unbalance__disc_1__moment': -1.0},
      'parameter fan.unbalance.disc_1.moment: Invalid parameter value (-1.0)'),
     ({'speed_reliability': 'sometimes'}, 'must be one of best_effort, reliable'),
-    ({'log__directory': '/tmp/x', 'log__name': '../x'}, 'parameter log.name'),
-    ({'log__directory': '/proc/nowhere'}, '/proc/nowhere')])
+    ({'log__directory': '/tmp/x', 'log__name': '../x'}, 'parameter log.name')])
 def test_a_node_that_cannot_be_configured_says_why_in_one_line(
         bench, parameters, complaint, capfd):
     node = bench.node('fan', **parameters)
@@ -294,3 +294,21 @@ def test_remapped_topics_are_heard_answered_and_logged_under_their_new_names(ben
     node.release()
     topics = topics_of(tmp_path / 'run')
     assert {'/plant/turbine', '/angle', '/rotorsoil/fan/amplitude'} <= set(topics)
+
+
+def test_a_disk_that_is_not_there_keeps_no_node_from_answering(bench, tmp_path):
+    place = tmp_path / 'mount'
+    place.write_text('not a directory')
+    node = bench.active('fan', log__directory=str(place / 'logs'), log__rerun=False)
+    amplitude, _ = bench.answers()
+    publish = bench.speaker()
+    publish(joint_state([300.0]))
+    bench.graph.until(lambda: amplitude, 'the answer')
+    node._tick()
+    assert node._log.report(0).level == Level.ERROR
+    place.unlink()
+    bench.graph.until(lambda: node._log.path and node._log.report(0).level < Level.ERROR, 'a log')
+    publish(joint_state([301.0], stamp=STAMP + 1))
+    bench.graph.until(lambda: len(amplitude) == 2, 'the next answer')
+    node.release()
+    assert '/rotorsoil/fan/amplitude' in topics_of(place / 'logs' / 'run')

@@ -6,7 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from rotorsoil_ros.bags.retention import make_room, new_directory
+from rotorsoil_ros.bags.retention import make_room, MARKER, new_directory
+from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 
 from graphs import DEADLINE_S
@@ -42,7 +43,7 @@ def test_a_recording_begins_with_each_file_of_the_bag(tmp_path, machine):
     log.close()
     assert told == []
     assert sorted(file.name for file in (tmp_path / 'run').iterdir()) == [
-        'metadata.yaml', 'run.rrd', 'run_0.mcap', 'run_1.mcap', 'run_1.rrd', 'run_2.mcap',
+        MARKER, 'metadata.yaml', 'run.rrd', 'run_0.mcap', 'run_1.mcap', 'run_1.rrd', 'run_2.mcap',
         'run_2.rrd', 'run_3.mcap']
     for number, name in enumerate(('run', 'run_1', 'run_2')):
         stamps, _ = column(tmp_path / 'run' / f'{name}.rrd', '/fan/speed', 'Scalars:scalars')
@@ -53,8 +54,11 @@ def test_a_recording_begins_with_each_file_of_the_bag(tmp_path, machine):
 def test_old_recordings_of_the_bag_that_is_written_make_room_and_the_newest_stays(tmp_path):
     bag = new_directory(tmp_path, 'run')
     names = ['run.rrd', 'run_0.mcap', 'run_1.rrd', 'run_1.mcap', 'run_2.rrd', 'run_2.mcap']
+    with LogFile(tmp_path / 'any.mcap') as log:
+        log.flush()
+    own = log.path.read_bytes()[:100].ljust(100, b'\0')
     for age, name in enumerate(names):
-        (bag / name).write_bytes(bytes(100))
+        (bag / name).write_bytes(own)
         os.utime(bag / name, (1e9 + age, 1e9 + age))
     removed = make_room(
         tmp_path, 'run', budget=350, current=bag, keep=bag / 'run_2.mcap',
@@ -64,4 +68,5 @@ def test_old_recordings_of_the_bag_that_is_written_make_room_and_the_newest_stay
         tmp_path, 'run', budget=0, current=bag, keep=bag / 'run_2.mcap',
         complain=pytest.fail)
     assert [file.name for file in removed] == ['run_1.mcap']
-    assert sorted(file.name for file in bag.iterdir()) == ['run_2.mcap', 'run_2.rrd']
+    assert sorted(file.name for file in bag.iterdir()) == [
+        MARKER, 'run_2.mcap', 'run_2.rrd']
