@@ -32,7 +32,6 @@ ziafont.config.svg2 = False  # glyphs in place: names would clash on one page
 suppress_warnings = ['myst.xref_missing', 'config.cache']
 
 autosummary_generate = True
-autodoc_default_options = {'members': True, 'undoc-members': False}
 autodoc_typehints = 'none'
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False

@@ -6,10 +6,13 @@ import re
 import yaml
 
 from rotorsoil_ros.node.parameters import OF_MACHINE, OWN
+from rotorsoil_ros.wire.handlers import TOPICS
+from rotorsoil_ros.wire.messages import OWN_TOPICS
 
 from graphs import Bench
 
 ROOT = Path(__file__).parents[2]
+START = ROOT / 'docs' / 'start' / 'ros_developer.md'
 # With use_sim_time; when a sensor publishes.
 NOT_ALWAYS = {'/clock', '/fan/measured/disc_1_x/imu'}
 
@@ -47,5 +50,13 @@ def test_the_example_of_parameters_names_only_parameters_of_the_node():
 
 
 def test_every_parameter_is_told_in_the_documents():
-    told = (ROOT / 'docs' / 'operations.md').read_text() + (ROOT / 'README.md').read_text()
+    told = (ROOT / 'docs' / 'operations.md').read_text() + START.read_text()
     assert [name for name in OWN if f'`{name}`' not in told] == []
+    assert [name for name in OF_MACHINE if f'<machine>.{name}`' not in told] == []
+
+
+def test_every_topic_is_told_where_a_developer_starts():
+    told = START.read_text()
+    # Two names of one row: the second without what both begin with.
+    assert [name for name in (*TOPICS, *OWN_TOPICS) if f'<machine>/{name}`' not in told
+            and f'.../{name.split("/")[-1]}`' not in told] == []
