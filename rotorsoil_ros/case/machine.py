@@ -12,7 +12,7 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, config, document, models
-from rotorsoil_ros.case.summary import stability_doubts, undecided, unstable
+from rotorsoil_ros.case.summary import band_contents, stability_doubts, undecided, unstable
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
@@ -254,12 +254,12 @@ class Machine:
 
         """
         speed = rpm_to_rad_s(_numbers('rpm', rpm))
-        found = models.response_band(self.case, self.model, self.table)
+        found = models.response_band(self.case, self.model, self.table, self.directory)
         if found is None:
             raise InputError(f'{self.case.path}: support.model: {self.case.support.model} knows '
                              'of no soil, so that there is no band')
-        bounds = found.envelope(self.case.unbalance).at(speed)
         nominal = self.table.predictor(self.case.unbalance).answer(speed)
+        bounds = found.envelope(self.case.unbalance).at(speed).around(nominal.displacement)
         return Bounds(self.table.channels, speed, bounds.low, np.abs(nominal.displacement),
                       bounds.high)
 
@@ -293,6 +293,7 @@ class Machine:
             'unstable_rad_s': self.table.stability.unstable.tolist(),
             'unstable': list(unstable(self.table.stability)),
             'doubts': list(stability_doubts(self.table.stability)),
+            'band_holds': band_contents(self.case),
             'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
             'unbalance': {
                 disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}

@@ -1,25 +1,32 @@
 """The models that a case stands for, with their tables out of the cache."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case, infinite_range
-from rotorsoil_ros.errors import InputError, solved
+from rotorsoil_ros.errors import InputError, RotorSoilError, solved
+from rotorsoil_ros.ground.accuracy import mapping_error
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.elements.table import DimensionlessTable
+from rotorsoil_ros.ground.elements.table import DimensionlessTable, require_kind
 from rotorsoil_ros.ground.half_space import a0_range, ALGORITHM, InfiniteElementModel
+from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.band import (
     depends_on_soil,
     highest_poisson_ratio,
+    of_other_form,
     on_soils,
     ResponseBand,
     SoilSpread,
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
+
+# Rectangles that are longer than any that was measured are taken to be off by this.
+_LARGEST_MAPPING = 0.5
 
 
 def coupled_model(case: Case, directory: Path) -> CoupledModel:
@@ -159,15 +166,66 @@ def response_table(case: Case, model: CoupledModel, directory: Path) -> Response
 
 
 def response_band(
-    case: Case, model: CoupledModel, table: ResponseTable, spread: SoilSpread | None = None,
+    case: Case, model: CoupledModel, table: ResponseTable, directory: Path,
+    spread: SoilSpread | None = None,
 ) -> ResponseBand | None:
     """
     Return the response of a case on all soils of its spread, or of another one.
 
+    Besides the soil it holds the spread of the bearings and, unless the spread says otherwise,
+    the error of the models: every second machine stands on infinite elements instead of cones,
+    and of each pair of these one on ground as much stiffer as a rectangle may be than its disc.
     None on a support that knows of no soil.
     """
     if case.soil is None or not depends_on_soil(model):
         return None
-    soils = (spread or case.uncertainty).soils(
-        case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
-    return ResponseBand.build(table, on_soils(model, soils[1:]))
+    spread = spread or case.uncertainty
+    soils = spread.soils(case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
+    elements, stiffer = _other_forms(case, spread, directory)
+    forms = list(_forms(soils, with_elements=bool(elements), with_stiffer=any(stiffer)))
+    forms = forms[:spread.samples - 1]
+    machines = on_soils(model, [soil for soil, _, _ in forms])
+    factors = spread.bearing_factors(len(forms))
+    others = []
+    for machine, (soil, on_solved, on_stiffer), factor in zip(
+            machines, forms, factors.tolist(), strict=True):
+        own = tuple(on_soil(one, soil, block.contact) for one, block
+                    in zip(elements, model.foundations, strict=False))
+        others.append(of_other_form(machine, solved=own, stiffer=stiffer, bearings=factor,
+                                    takes_solved=on_solved, takes_stiffer=on_stiffer))
+    return ResponseBand.build(table, others)
+
+
+def _forms(
+    soils: list[Soil], *, with_elements: bool, with_stiffer: bool,
+) -> Iterator[tuple[Soil, bool, bool]]:
+    """Yield soils, and whether on infinite elements and on stiffer ground: extremes first."""
+    given, softest, stiffest, *others = soils
+    ways = [(on_elements, on_stiffer) for on_stiffer in (False, True)[:1 + with_stiffer]
+            for on_elements in (False, True)[:1 + with_elements]]
+    for number, way in enumerate(ways):
+        yield from ((soil, *way) for soil in (softest, stiffest, given)[:2 + bool(number)])
+    yield from ((soil, *ways[number % len(ways)]) for number, soil in enumerate(others))
+
+
+def _other_forms(
+    case: Case, spread: SoilSpread, directory: Path,
+) -> tuple[list[SoilModel], list[float]]:
+    """Return what the ground below each block may be instead, and how much stiffer."""
+    stiffer = [0.0] * len(case.foundations)
+    if not spread.model_form or case.soil is None or case.support.geometry != 'disc':
+        return [], stiffer
+    stiffer = [min(mapping_error(block.contact), _LARGEST_MAPPING) for block in case.foundations]
+    if case.support.model != 'cone':
+        return [], stiffer
+    low, high = case.speed_range
+    # A softer soil has shorter waves: its table has to reach further.
+    reach = max(1.0, 0.5 * spread.shear_modulus_factor**0.5)
+    try:
+        require_kind('disc', case.soil.poisson_ratio, case.soil.loss_factor)
+        elements: list[SoilModel] = [infinite_element_model(
+            case.soil, block.contact, 'disc', cache=Cache(directory),
+            speed_range=(low, reach * high)) for block in case.foundations]
+    except RotorSoilError:  # beyond the reach of infinite elements: `band_contents` says so
+        return [], stiffer
+    return elements, stiffer

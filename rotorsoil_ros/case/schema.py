@@ -10,6 +10,7 @@ from pydantic import (
     Discriminator,
     model_validator,
     ModelWrapValidatorHandler,
+    StrictBool,
     StringConstraints,
     Tag,
     ValidationError,
@@ -291,6 +292,8 @@ class Uncertainty(Entry):
     poisson_ratio: Ratio | None = None
     loss_factor: Ratio | None = None
     samples: Count | None = None
+    bearing_stiffness_factor: Ratio | None = None
+    model_form: StrictBool | None = None
 
 
 Velocities: TypeAlias = tuple[MetrePerSecond, MetrePerSecond, MetrePerSecond]

@@ -16,6 +16,7 @@ from rotorsoil_ros.ground.accuracy import (
     neglected_coupling,
     side_ratio,
 )
+from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.stability import Stability
@@ -56,6 +57,8 @@ def derived_quantities(
         told = model_error(case, foundation)
         if told:
             yield f'{foundation.name}: model error', told
+    if band_contents(case):
+        yield 'edges of the band hold', band_contents(case)
 
 
 def _of_foundation(
@@ -94,6 +97,27 @@ def model_error(case: Case, foundation: Foundation) -> str:
         off = f'up to {share:.0%}' if share < math.inf else 'more than 37%'
         parts.append(f'discs for a rectangle of {ratio:.3g} to 1: stiffness off by {off}')
     return '; '.join(parts) or 'infinite elements of a disc: within 0.5%'
+
+
+def band_contents(case: Case) -> str:
+    """Return what the edges of the band of a case hold; empty if it has none."""
+    if case.soil is None or case.support.model not in ('cone', 'infinite_elements'):
+        return ''
+    spread = case.uncertainty
+    parts = [f'soil (G within a factor {spread.shear_modulus_factor:g}, nu within '
+             f'{spread.poisson_ratio:g}, eta within {spread.loss_factor:g})']
+    if spread.bearing_stiffness_factor > 1.0:
+        parts.append(f'bearings (stiffness within a factor {spread.bearing_stiffness_factor:g})')
+    if not spread.model_form or case.support.geometry != 'disc':
+        return '; '.join([*parts, 'not the error of the models'])
+    if case.support.model == 'cone':
+        known = case.soil.poisson_ratio <= LARGEST_POISSON_RATIO
+        parts.append('cones against infinite elements' if known else
+                     'not cones against infinite elements, which end at nu = '
+                     f'{LARGEST_POISSON_RATIO:g}')
+    if any(isinstance(block.contact, Rectangle) for block in case.foundations):
+        parts.append('discs against rectangles')
+    return '; '.join(parts)
 
 
 def _of_neighbours(case: Case) -> Iterator[str]:

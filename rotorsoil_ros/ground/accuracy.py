@@ -1,10 +1,12 @@
 """How far are the models of the ground from the ground itself: shapes, neighbours, cones."""
 
+from dataclasses import dataclass
 import math
 
 import numpy as np
 
-from rotorsoil_ros.ground.soil import Circle, Contact
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.ground.soil import Circle, Contact, SoilModel
 
 # Largest error of any stiffness where discs of equal area and second moment stand for a welded
 # rectangle, over a0 up to 3.8 and nu 0.25 to 1/3, against rigorous solutions of the rectangle:
@@ -20,6 +22,28 @@ CONE_ERROR = 0.25
 _GAPS = (0.25, 1.0, 4.0, 16.0)
 _COUPLINGS = (0.45, 0.29, 0.20, 0.13)
 _CHANGES = (0.11, 0.08, 0.024, 0.012)
+
+
+@dataclass(frozen=True, slots=True)
+class StifferGround:
+    """
+    Ground that is stiffer by a share in every motion, as a rectangle is than its disc.
+
+    Attributes
+    ----------
+    model : SoilModel
+        The ground.
+    share : float
+        > 0 [-].
+
+    """
+
+    model: SoilModel
+    share: float
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
+        return np.asarray(self.model.compliance(omega) / (1.0 + self.share))
 
 
 def side_ratio(contact: Contact) -> float:

@@ -8,22 +8,31 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import require
+from rotorsoil_ros.ground.accuracy import StifferGround
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.neighbours import on_soil
-from rotorsoil_ros.ground.soil import Soil
+from rotorsoil_ros.ground.soil import Soil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.pieces import refine, Solver
-from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.response import Predictor, ResponseTable
 
 # A band of amplitudes need not be as sharp as a prediction.
 _TOLERANCE = 1e-3
 
-# Speeds per piece at which the band is computed; it is linear between them.
+# Speeds per piece at which the band is computed at first.
 _POINTS = 8
+
+# Between two speeds the edges may be off by this share of themselves, down to amplitudes of the
+# second share of the largest of a channel, after so many halvings.
+_EDGE_ERROR = 0.02
+_EDGE_FLOOR = 1e-5
+_EDGE_HALVINGS = 10
+
+_MOST_SAMPLES = 4096
 
 # Phases further apart than this say nothing about the phase any more [rad].
 _NO_PHASE = 0.95 * math.pi
@@ -42,6 +51,11 @@ class SoilSpread:
         Half-widths of the ranges of nu and eta [-], cut where they would leave the possible.
     samples : int
         Number of soils, at least 3: the given one and both extremes of G are among them.
+    bearing_stiffness_factor : float
+        The stiffness of all bearings lies between that of the case over and times this, evenly
+        in its logarithm [-].
+    model_form : bool
+        Whether the error of the models of the ground themselves is part of the band.
 
     References
     ----------
@@ -53,6 +67,8 @@ class SoilSpread:
     poisson_ratio: float = 0.05
     loss_factor: float = 0.03
     samples: int = 64
+    bearing_stiffness_factor: float = 1.0
+    model_form: bool = True
 
     def __post_init__(self) -> None:
         require(1.0 <= self.shear_modulus_factor < math.inf, 'shear_modulus_factor',
@@ -60,7 +76,10 @@ class SoilSpread:
         require(0.0 <= self.poisson_ratio < 0.5, 'poisson_ratio', 'in [0, 0.5)',
                 self.poisson_ratio)
         require(0.0 <= self.loss_factor < 1.0, 'loss_factor', 'in [0, 1)', self.loss_factor)
-        require(self.samples >= 3, 'samples', 'at least 3', self.samples)
+        require(3 <= self.samples <= _MOST_SAMPLES, 'samples',
+                'at least 3' if self.samples < 3 else f'at most {_MOST_SAMPLES}', self.samples)
+        require(1.0 <= self.bearing_stiffness_factor < math.inf, 'bearing_stiffness_factor',
+                '>= 1 and finite', self.bearing_stiffness_factor)
 
     def soils(self, soil: Soil, *, highest_poisson_ratio: float = 0.49) -> list[Soil]:
         """
@@ -86,6 +105,14 @@ class SoilSpread:
         loss = np.maximum(0.0, soil.loss_factor + self.loss_factor * (2.0 * cube[:, 2] - 1.0))
         return extremes + [Soil(g, nu, soil.density, eta) for g, nu, eta in zip(
             modulus.tolist(), poisson.tolist(), loss.tolist(), strict=True)]
+
+    def bearing_factors(self, count: int) -> FloatArray:
+        """Return by what the bearings' stiffness is multiplied in each of so many machines."""
+        # Golden-ratio steps are even in every part of the sequence, and both ends come first.
+        share = np.mod(0.5 + np.arange(count) * (5.0**0.5 - 1.0) / 2.0, 1.0)
+        share[1:3] = (0.0, 1.0)[:max(0, min(2, count - 1))]
+        share[:1] = 0.5
+        return np.asarray(self.bearing_stiffness_factor ** (2.0 * share - 1.0))
 
 
 @dataclass(frozen=True)
@@ -115,6 +142,22 @@ class Envelope:
         """Speeds as plain numbers, and all four bounds side by side, (n, 4, c)."""
         return self.speed.tolist(), np.stack(
             [self.low, self.high, self.behind, self.ahead], axis=1)
+
+    def around(self, nominal: ComplexArray) -> 'Envelope':
+        """
+        Return the envelope with the response of the given machine inside it.
+
+        Parameters
+        ----------
+        nominal : (n, c) complex array
+            Its displacement at the same speeds; NaN where there is none. Edges are straight
+            between some speeds, where it may be as deep as an antiresonance.
+
+        """
+        size = np.abs(nominal)
+        inside = np.isfinite(self.low)
+        return replace(self, low=np.where(inside, np.fmin(self.low, size), self.low),
+                       high=np.where(inside, np.fmax(self.high, size), self.high))
 
     def at(self, speed: FloatArray) -> 'Envelope':
         """Return the envelope between its speeds, NaN outside them."""
@@ -172,21 +215,64 @@ class ResponseBand:
             table.stability) for model in models)))
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:
-        """Return the band under one unbalance, (p,) [kg m]."""
+        """
+        Return the band under one unbalance, (p,) [kg m].
+
+        Where a straight line between two speeds would miss an edge, there is another speed.
+        """
+        predictors = [table.predictor(unbalance) for table in self.tables]
         edges = np.unique(np.concatenate([table.pieces.edges for table in self.tables]))
         inner = np.arange(_POINTS) / _POINTS
-        speed = np.append((edges[:-1, None] + np.diff(edges)[:, None] * inner).ravel(), edges[-1])
-        nominal = _response(self.tables[0], unbalance, speed)
-        low = high = np.abs(nominal)
-        behind = ahead = np.zeros_like(low)
-        for table in self.tables[1:]:
-            response = _response(table, unbalance, speed)
-            size, turn = np.abs(response), np.angle(response * nominal.conj())
-            low, high = np.fmin(low, size), np.fmax(high, size)
-            behind, ahead = np.fmin(behind, turn), np.fmax(ahead, turn)
-        unknown = ahead - behind > _NO_PHASE
-        return Envelope(speed, low, high, np.where(unknown, -math.pi, behind),
-                        np.where(unknown, math.pi, ahead))
+        found = _extremes(predictors, np.append(
+            (edges[:-1, None] + np.diff(edges)[:, None] * inner).ravel(), edges[-1]))
+        fresh: BoolArray = np.ones(len(found.speed) - 1, dtype=bool)
+        for _ in range(_EDGE_HALVINGS):
+            left = np.flatnonzero(fresh)
+            exact = _extremes(predictors, 0.5 * (found.speed[left] + found.speed[left + 1]))
+            missed = _is_missed(found, exact, left)
+            if not missed.any():
+                break
+            found, fresh = _inserted(found, exact, left, missed)
+        return found
+
+
+def _extremes(predictors: Sequence[Predictor], speed: FloatArray) -> Envelope:
+    """Return smallest and largest amplitude and phase of all machines at speeds, exactly."""
+    nominal = _response(predictors[0], speed)
+    low = high = np.abs(nominal)
+    behind = ahead = np.zeros_like(low)
+    for predictor in predictors[1:]:
+        response = _response(predictor, speed)
+        size, turn = np.abs(response), np.angle(response * nominal.conj())
+        low, high = np.fmin(low, size), np.fmax(high, size)
+        behind, ahead = np.fmin(behind, turn), np.fmax(ahead, turn)
+    unknown = ahead - behind > _NO_PHASE
+    return Envelope(speed, low, high, np.where(unknown, -math.pi, behind),
+                    np.where(unknown, math.pi, ahead))
+
+
+def _is_missed(found: Envelope, exact: Envelope, left: IntArray) -> BoolArray:
+    """Return between which speeds a straight line misses an edge in the middle, (k,)."""
+    missed = np.zeros(len(left), dtype=bool)
+    for edge, true in ((found.low, exact.low), (found.high, exact.high)):
+        line = 0.5 * (edge[left] + edge[left + 1])
+        largest = np.nanmax(np.where(np.isfinite(found.high), found.high, 0.0), axis=0)
+        allowed = _EDGE_ERROR * np.maximum(true, _EDGE_FLOOR * largest)
+        missed |= np.any(np.abs(line - true) > allowed, axis=1)
+    return missed
+
+
+def _inserted(
+    found: Envelope, exact: Envelope, left: IntArray, missed: BoolArray,
+) -> tuple[Envelope, BoolArray]:
+    """Return an envelope with more speeds, and which intervals between them are new."""
+    place = left[missed] + 1
+    parts = [np.insert(getattr(found, name), place, getattr(exact, name)[missed], axis=0)
+             for name in ('speed', 'low', 'high', 'behind', 'ahead')]
+    fresh = np.zeros(len(parts[0]) - 1, dtype=bool)
+    new = place + np.arange(len(place))
+    fresh[new], fresh[new - 1] = True, True
+    return Envelope(*parts), fresh
 
 
 def _solver(model: CoupledModel) -> Solver:
@@ -200,13 +286,9 @@ def _solver(model: CoupledModel) -> Solver:
     return solve
 
 
-def _response(table: ResponseTable, unbalance: ComplexArray, speed: FloatArray) -> ComplexArray:
+def _response(predictor: Predictor, speed: FloatArray) -> ComplexArray:
     """Return displacement amplitudes, (n, c), NaN where the table does not cover a speed."""
-    predictor = table.predictor(unbalance)
-    covered = predictor.covers(speed)
-    response = np.full((len(speed), len(table.channels)), complex(np.nan, np.nan))
-    response[covered] = predictor.predict(speed[covered]).displacement
-    return response
+    return predictor.answer(speed).displacement
 
 
 def depends_on_soil(model: CoupledModel) -> bool:
@@ -220,6 +302,37 @@ def on_soils(model: CoupledModel, soils: Sequence[Soil]) -> list[CoupledModel]:
         on_soil(own, soil, block.contact)
         for own, block in zip(model.soil_models, model.foundations, strict=True)))
         for soil in soils]
+
+
+def of_other_form(
+    model: CoupledModel, *, solved: Sequence[SoilModel], stiffer: Sequence[float],
+    bearings: float, takes_solved: bool, takes_stiffer: bool,
+) -> CoupledModel:
+    """
+    Return a machine whose models of the ground and of the bearings are others.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    solved : sequence of SoilModel
+        What may stand in place of the model below each block; empty if there is none.
+    stiffer : sequence of float
+        Share by which each contact may be stiffer than its disc.
+    bearings : float
+        Factor of the stiffness of all bearings.
+    takes_solved, takes_stiffer : bool
+        Whether either is taken.
+
+    """
+    soils = tuple(solved) if takes_solved and solved else tuple(model.soil_models)
+    if takes_stiffer:
+        soils = tuple(StifferGround(soil, share) if share else soil
+                      for soil, share in zip(soils, stiffer, strict=True))
+    rotor = model.rotor
+    if bearings != 1.0:
+        rotor = replace(rotor, bearings=tuple(one.stiffer(bearings) for one in rotor.bearings))
+    return replace(model, rotor=rotor, soil_models=soils)
 
 
 def highest_poisson_ratio(model: CoupledModel) -> float:

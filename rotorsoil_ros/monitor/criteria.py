@@ -66,7 +66,7 @@ class Expectation:
         spread = spread or case.uncertainty
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
-        band = models.response_band(case, model, table, spread)
+        band = models.response_band(case, model, table, directory, spread)
         notes = list(unstable(table.stability))
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
         span = model.within_tables((min(low, case.speed_range[0] or low), high))

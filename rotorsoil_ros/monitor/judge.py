@@ -109,7 +109,8 @@ class Judge:
         if self._envelope is not None:
             rows = list(self._band_rows(stamp_ns, speed))
             if rows:
-                band = self._envelope.at(speed[rows])
+                band = self._envelope.at(speed[rows]).around(
+                    answer(self._predictor, speed[rows]))
                 yield Band(self.machine, stamp_ns[rows], speed[rows], band.low, band.high)
         yield from self._matched()
 
@@ -263,11 +264,12 @@ class Judge:
         columns = [self._predictor.channels.index(name) if name in self._predictor.channels
                    else -1 for name in names]
         unknown = np.array(columns) < 0
-        predicted = answer(self._predictor, speed)[:, columns]
+        nominal = answer(self._predictor, speed)
+        predicted = nominal[:, columns]
         predicted[:, unknown] = complex(math.nan, math.nan)
         bounds = [np.full(amplitude.shape, np.nan)] * 4
         if self._envelope is not None:
-            band = self._envelope.at(speed)
+            band = self._envelope.at(speed).around(nominal)
             bounds = [np.where(unknown, np.nan, part[:, columns])
                       for part in (band.low, band.high, band.behind, band.ahead)]
         return Compared(

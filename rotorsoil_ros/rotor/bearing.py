@@ -1,6 +1,6 @@
 """What holds the shaft: bearings and seals, their tables over speed, and their pedestals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from typing import TYPE_CHECKING
@@ -138,6 +138,13 @@ class Bearing:
     def nominal_stiffness(self) -> float:
         """Mean direct stiffness over its directions and speeds [N/m]."""
         return float(np.abs(np.diagonal(_values(self.stiffness), axis1=-2, axis2=-1)).mean())
+
+    def stiffer(self, factor: float) -> 'Bearing':
+        """Return the same bearing with its stiffness times a factor."""
+        own = self.stiffness
+        scaled = (SpeedTable(own.speed, factor * own.values) if isinstance(own, SpeedTable)
+                  else factor * own)
+        return replace(self, stiffness=scaled)
 
     def coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """

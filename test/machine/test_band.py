@@ -7,7 +7,8 @@ import pytest
 
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
+from rotorsoil_ros.ground.soil import Soil
+from rotorsoil_ros.machine.band import Envelope, of_other_form, ResponseBand, SoilSpread
 from rotorsoil_ros.machine.response import ResponseTable
 
 from machines import CONTACT, paper_machine, SOIL
@@ -57,6 +58,65 @@ def test_given_soil_lies_in_its_band(models, envelope):
     assert np.all(np.abs(exact)[:, moving] <= slack[1] * found.high[:, moving])
 
 
+def sharp_machine(soil=SOIL):
+    """Return the paper's machine with bearings that hardly damp: deep antiresonances."""
+    return paper_machine(ConeModel(soil, CONTACT), mass=4200.0, damping=5.0)
+
+
+def test_prediction_lies_in_its_own_band_everywhere():
+    table = ResponseTable.build(sharp_machine(), RANGE)
+    others = [sharp_machine(soil) for soil in SoilSpread(samples=5).soils(SOIL)[1:]]
+    found = ResponseBand.build(table, others).envelope(UNBALANCE)
+    speed = np.sort(np.random.default_rng(3).uniform(*RANGE, 20_000))
+    nominal = table.predictor(UNBALANCE).predict(speed).displacement
+    band = found.at(speed).around(nominal)
+    assert band.holds(nominal).all()
+    # What the guard lifts is no more than what straight lines may miss.
+    moving = np.abs(nominal).max(axis=0) > 1e-9 * np.abs(nominal).max()
+    plain, size = found.at(speed), np.abs(nominal)[:, moving]
+    floor = 2e-2 * np.maximum(size, 1e-5 * size.max(axis=0))
+    assert np.all(plain.low[:, moving] <= size + 2.0 * floor)
+    assert np.all(plain.high[:, moving] >= size - 2.0 * floor)
+
+
+def test_edges_follow_an_antiresonance_between_the_first_speeds():
+    table = ResponseTable.build(sharp_machine(), RANGE)
+    others = [sharp_machine(soil) for soil in SoilSpread(samples=5).soils(SOIL)[1:]]
+    found = ResponseBand.build(table, others).envelope(UNBALANCE)
+    speed = np.sort(np.random.default_rng(5).uniform(*RANGE, 4000))
+    exact = np.abs([model.unbalance_response(speed, UNBALANCE).displacement
+                    for model in (sharp_machine(), *others)])
+    moving = exact.max(axis=(0, 1)) > 1e-9 * exact.max()
+    band = found.at(speed)
+    low, high = exact.min(axis=0)[:, moving], exact.max(axis=0)[:, moving]
+    floor = np.maximum(low, 1e-4 * high.max(axis=0))
+    assert np.mean(np.abs(band.low[:, moving] - low) > 0.05 * floor) < 0.01
+    assert np.mean(np.abs(band.high[:, moving] - high) > 0.05 * high) < 0.01
+
+
+def test_bearings_spread_evenly_over_their_factor():
+    factors = SoilSpread(bearing_stiffness_factor=3.0).bearing_factors(64)
+    assert (factors.min(), factors.max()) == (1.0 / 3.0, 3.0)
+    assert factors[0] == 1.0
+    assert np.median(factors) == pytest.approx(1.0, rel=0.1)
+    assert set(SoilSpread().bearing_factors(9)) == {1.0}
+
+
+def test_other_forms_change_ground_and_bearings_only():
+    model, soft = paper_machine(), ConeModel(Soil(1e6, 0.2, 1800.0), CONTACT)
+    same = of_other_form(model, solved=[soft], stiffer=[0.2], bearings=1.0, takes_solved=False,
+                         takes_stiffer=False)
+    assert same == model
+    other = of_other_form(model, solved=[soft], stiffer=[0.2], bearings=2.0, takes_solved=True,
+                          takes_stiffer=True)
+    omega = np.array([100.0])
+    np.testing.assert_allclose(other.soil_models[0].compliance(omega),
+                               soft.compliance(omega) / 1.2, rtol=1e-15)
+    for one, two in zip(model.rotor.bearings, other.rotor.bearings, strict=True):
+        np.testing.assert_array_equal(2.0 * one.stiffness, two.stiffness)
+        np.testing.assert_array_equal(one.damping, two.damping)
+
+
 def test_soil_matters_near_the_resonance_and_not_far_above_it():
     # A mass on a spring: below 1.5 f_n the band matters, above 3 f_n mass decides.
     soft = [paper_machine(ConeModel(soil, CONTACT), mass=2000.0)
@@ -93,7 +153,9 @@ def test_spread_holds_the_given_soil_and_both_extremes():
     ({'shear_modulus_factor': 0.5}, 'shear_modulus_factor must be >= 1 and finite, got 0.5'),
     ({'poisson_ratio': math.nan}, r'poisson_ratio must be in \[0, 0.5\)'),
     ({'loss_factor': -0.1}, r'loss_factor must be in \[0, 1\)'),
-    ({'samples': 2}, 'samples must be at least 3, got 2')])
+    ({'samples': 2}, 'samples must be at least 3, got 2'),
+    ({'samples': 10**9}, 'samples must be at most 4096'),
+    ({'bearing_stiffness_factor': 0.5}, 'bearing_stiffness_factor must be >= 1 and finite')])
 def test_impossible_spread_is_refused(change, rule):
     with pytest.raises(RotorSoilError, match=rule):
         SoilSpread(**change)

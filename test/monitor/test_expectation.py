@@ -1,13 +1,20 @@
 """What a case leads one to expect, and that a band costs no solution of the soil."""
 
+import dataclasses
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.case.models import coupled_model
+from rotorsoil_ros.case.models import (
+    coupled_model,
+    infinite_element_model,
+    response_band,
+    response_table,
+)
 from rotorsoil_ros.ground.elements import tabulate as elements_tabulate
 from rotorsoil_ros.machine.band import SoilSpread
 from rotorsoil_ros.monitor.criteria import answer, Expectation
@@ -79,3 +86,34 @@ def test_comparison_goes_on_where_a_table_does_not_determine_the_modes(tmp_path)
     prediction = answer(found.table.predictor(case.unbalance), np.array([300.0, 1e6]))
     assert np.isfinite(prediction[0]).any()
     assert np.isnan(prediction[1]).all()  # out of the table
+
+
+@pytest.mark.slow
+def test_truth_on_infinite_elements_leaves_the_band_of_cones_only_without_model_form(tmp_path):
+    # Of 60 soils 100 and 2 percent: `python benchmarks/band.py`.
+    case = load(CASES / 'plant_fan.yaml')
+    model = coupled_model(case, tmp_path)
+    table = response_table(case, model, tmp_path)
+    speed = np.linspace(*case.speed_range, 300)
+    nominal = table.predictor(case.unbalance).answer(speed).displacement
+    moving = np.abs(nominal).max(axis=0) > 1e-9 * np.abs(nominal).max()
+    worst = {}
+    for form in (False, True):
+        band = response_band(case, model, table, tmp_path,
+                             dataclasses.replace(case.uncertainty, model_form=form))
+        found = band.envelope(case.unbalance).at(speed).around(nominal)
+        worst[form] = max(
+            np.max(np.abs(truth)[:, moving] / found.high[:, moving])
+            for truth in truths(case, model, speed, tmp_path))
+    assert worst[False] > 1.4
+    assert worst[True] < 1.15
+
+
+def truths(case, model, speed, directory):
+    for factor in (0.6, 0.8, 1.2, 1.7):
+        soil = dataclasses.replace(case.soil, shear_modulus=factor * case.soil.shear_modulus)
+        ground = tuple(infinite_element_model(soil, block.contact, 'disc', cache=Cache(directory),
+                                              speed_range=case.speed_range)
+                       for block in model.foundations)
+        truth = dataclasses.replace(model, soil_models=ground)
+        yield truth.unbalance_response(speed, case.unbalance).displacement
