@@ -98,6 +98,9 @@ _LARGEST_TABLE = 2 * _GIB
 # Surface speed at which rho v^2 of steel is a twelfth of its modulus [m/s].
 _BURSTING = 1500.0
 
+# A wider shaft was given in mm [m].
+_WIDEST = 3.0
+
 # Natural modes above the running speed and excitation at twice the speed need the soil too.
 _HIGHEST_ORDER = 2.0
 
@@ -229,7 +232,9 @@ class _Builder:
         if surface > _BURSTING:
             raise self.faults.error('speed_range_rpm', 1, problem=(
                 f'must turn the shaft, {widest:.4g} m wide, slower than {_BURSTING:g} m/s at its '
-                f'surface, which no material survives, got {highest:g} rpm, {surface:.4g} m/s'))
+                f'surface, which no material survives, got {highest:g} rpm, {surface:.4g} m/s'
+                + (f'; did you mean a diameter of {1e-3 * widest:.4g} m?'
+                   if widest > _WIDEST else '')))
 
     def _refuse_size(self, model: CoupledModel) -> None:
         """Raise an InputError before a table is computed that would fill the memory."""

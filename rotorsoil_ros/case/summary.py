@@ -7,6 +7,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.accuracy import (
@@ -143,6 +144,7 @@ def warnings(case: Case) -> Iterator[str]:
     """Yield what is allowed but looks like a slip, or lies where a model is poor."""
     if not np.any(case.unbalance):
         yield 'unbalances: none, every prediction will be zero'
+    yield from slips(case)
     for disc in case.rotor.discs:
         if disc.polar_inertia > 2.0 * disc.diametral_inertia:
             yield (f'{disc.name}: polar inertia {disc.polar_inertia:g} kg m^2 is more than twice '
