@@ -105,7 +105,7 @@ def _compute(arguments: Sequence[str]) -> None:
     """Leave the tables of cases in a cache; stop at the first that fails."""
     directory, *files = arguments
     for file in files:
-        Machine.load(Path(file), cache_directory=Path(directory))
+        _complete(Path(file), Path(directory))
 
 
 def _is_tabulated(case: config.Case, directory: Path) -> bool:
