@@ -39,7 +39,7 @@ UNDER_WAY = {
     'rotorsoil_ros.cli.demo',
     'rotorsoil_ros.cli.pictures',
     'rotorsoil_ros.case.writer',
-    'rotorsoil_ros.monitor.identification', 'machine', 'twice',
+    'rotorsoil_ros.monitor.identification', 'twice',
 }
 
 

@@ -13,9 +13,9 @@ from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.margins import asked, half_power_factors
 from rotorsoil_ros.machine.mode_names import ModeNames
-from rotorsoil_ros.machine.modes import CriticalSpeed
+from rotorsoil_ros.machine.modes import asked, CriticalSpeed
+from rotorsoil_ros.machine.peaks import half_power_factors
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
 

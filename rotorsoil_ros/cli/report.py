@@ -23,9 +23,8 @@ from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.margins import asked
 from rotorsoil_ros.machine.mode_names import ModeNames
-from rotorsoil_ros.machine.modes import critical_speeds
+from rotorsoil_ros.machine.modes import asked, critical_speeds
 from rotorsoil_ros.machine.peaks import Peak, resonances
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.stability import Stability

@@ -34,6 +34,9 @@ _STEPS = 40
 # Separation margins that API 617 asks at most of criticals below and above a running speed.
 MARGIN_BELOW, MARGIN_ABOVE = 0.16, 0.26
 
+# Beyond the largest margin by so much: a critical speed just at it is still found.
+_MARGIN_ROUND_OFF = 1e-6
+
 
 @dataclass(frozen=True)
 class Campbell:
@@ -186,6 +189,12 @@ class CriticalSpeed:
             return 0.0
         margin = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), MARGIN_BELOW)
         return margin + (MARGIN_ABOVE - MARGIN_BELOW if self.speed > running else 0.0)
+
+
+def asked(running: float) -> tuple[float, float]:
+    """Return between which speeds [rad/s] a margin from a running speed can be missed."""
+    return ((1.0 - MARGIN_BELOW - _MARGIN_ROUND_OFF) * running,
+            (1.0 + MARGIN_ABOVE + _MARGIN_ROUND_OFF) * running)
 
 
 @solved('the modes of this machine')

@@ -14,8 +14,8 @@ from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine import eigen, modes, spectrum
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.margins import half_power_factors
 from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.machine.peaks import half_power_factors
 from rotorsoil_ros.machine.spectrum import SpectrumSolver
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
