@@ -9,12 +9,12 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     model_validator,
-    ModelWrapValidatorHandler,
     StrictBool,
     StringConstraints,
     Tag,
     ValidationError,
 )
+from pydantic.functional_validators import ModelWrapValidatorHandler
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from rotorsoil_ros.case.document import shown
