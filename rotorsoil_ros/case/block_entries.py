@@ -51,7 +51,7 @@ class BlockEntries:
                         f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap along '
                         f'y: centres are {apart:.4g} m apart')
 
-    def _foundation(self, index: int, entry: schema.Foundation) -> Foundation:
+    def _foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
         blocks = self.faults.entries.foundations
         # A bearing that names no block stands on the only one.
         own = (entry.name, None) if len(blocks) == 1 else (entry.name,)
@@ -72,7 +72,7 @@ class BlockEntries:
                 centre_of_gravity_height=centre, inertia=inertia, height=entry.height)
 
     def _body(
-        self, index: int, entry: schema.Foundation, contact: Contact,
+        self, index: int, entry: schema.FoundationEntry, contact: Contact,
     ) -> tuple[float, float, tuple[float, float, float]]:
         """Return mass, centre of gravity and inertia: given, or those of a solid block."""
         mass, centre, inertia, height = (
@@ -97,7 +97,7 @@ class BlockEntries:
         return (mass, 0.5 * height if centre is None else centre,
                 solid_inertia(contact, mass=mass, height=height) if inertia is None else inertia)
 
-    def _contact(self, index: int, entry: schema.Foundation) -> Contact:
+    def _contact(self, index: int, entry: schema.FoundationEntry) -> Contact:
         width, length, radius = entry.half_width, entry.half_length, entry.radius
         if radius is not None and width is None and length is None:
             return Circle(radius)

@@ -101,8 +101,9 @@ class Faults:
 
     def _stations(self) -> list[tuple[Place, str]]:
         rotor = self.entries.rotor
-        groups: list[tuple[Place, Sequence[schema.Foundation | schema.Disc | schema.Bearing
-                                           | schema.Probe]]] = [
+        groups: list[tuple[Place, Sequence[
+            schema.FoundationEntry | schema.DiscEntry | schema.BearingEntry
+            | schema.ProbeEntry]]] = [
             (('foundations',), self.entries.foundations), (('rotor', 'discs'), rotor.discs),
             (('rotor', 'bearings'), rotor.bearings), (('rotor', 'probes'), rotor.probes)]
         return [((*group, index), entry.name) for group, entries in groups

@@ -42,7 +42,7 @@ class Case:
         The file it came from.
     soil : Soil or None
         Half-space; None is allowed on a rigid support only.
-    support : schema.Support
+    support : schema.SupportEntry
         Which model of the soil, and its geometry.
     foundations : tuple of Foundation
         The blocks.
@@ -71,7 +71,7 @@ class Case:
     name: str
     path: Path
     soil: Soil | None
-    support: schema.Support
+    support: schema.SupportEntry
     foundations: tuple[Foundation, ...]
     rotor: Rotor
     unbalance: ComplexArray
@@ -325,7 +325,7 @@ class _Builder:
 
     def _zones(self) -> ZoneLimits:
         """Return the limits of a group, or those that the file gives itself."""
-        entry = self.faults.entries.zones or schema.Zones()
+        entry = self.faults.entries.zones or schema.ZonesEntry()
         own = (entry.label, entry.rigid, entry.flexible, entry.rigid_displacement,
                entry.flexible_displacement)
         given = any(part is not None for part in own)

@@ -1,6 +1,6 @@
 """What a YAML file says, read as if nobody could be trusted to have written it well."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 import re
@@ -15,6 +15,8 @@ _LARGEST_BYTES = 256 * 1024
 _LARGEST_DEPTH = 24
 _LARGEST_NODES = 50_000
 _LARGEST_SHOWN = 64
+# A mapping of more characters than this gets a line for each of its keys.
+_LONGEST_LINE = 96
 
 
 class _Loader(yaml.SafeLoader):
@@ -266,3 +268,52 @@ def _index(place: Any, step: str, *, known: str, source: str) -> int:
         raise InputError(f'{source}: {known} has {len(place)} entries, counted from 0, and no '
                          f'entry {step}')
     return int(step)
+
+
+def text_of(content: Mapping[str, Any], comments: Iterable[str]) -> str:
+    """Return the YAML of a case: comments first, then one line for what fits into one."""
+    head = [f'# {line}'.rstrip() for line in comments]
+    return '\n'.join([*head, *_block(content, '')]) + '\n'
+
+
+def _block(content: Mapping[str, Any], indent: str) -> Iterable[str]:
+    for key, value in content.items():
+        line = f'{indent}{key}: {_flow(value)}'
+        if not isinstance(value, (dict, list)) or not value or (
+                len(line) <= _LONGEST_LINE and not _holds_mappings(value)):
+            yield line
+        elif isinstance(value, dict):
+            yield f'{indent}{key}:'
+            yield from _block(value, indent + '  ')
+        elif _holds_mappings(value):
+            yield f'{indent}{key}:'
+            for entry in value:
+                yield from _entry(entry, indent + '  ')
+        else:
+            yield line
+
+
+def _entry(entry: Mapping[str, Any], indent: str) -> Iterable[str]:
+    """Yield an entry of a list; the first of its lines gets the dash."""
+    line = f'{indent}- {_flow(entry)}'
+    if len(line) <= _LONGEST_LINE:
+        yield line
+        return
+    lines = list(_block(entry, indent + '  '))
+    yield f'{indent}- {lines[0].lstrip()}'
+    yield from lines[1:]
+
+
+def _holds_mappings(value: Any) -> bool:
+    """Return whether a value is a list of mappings, or a mapping that holds one."""
+    if isinstance(value, list):
+        return any(isinstance(entry, dict) for entry in value)
+    return isinstance(value, dict) and any(_holds_mappings(entry) for entry in value.values())
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return '{' + ', '.join(f'{key}: {_flow(entry)}' for key, entry in value.items()) + '}'
+    if isinstance(value, (list, tuple)):
+        return '[' + ', '.join(map(_flow, value)) + ']'
+    return str(value) if isinstance(value, str) else repr(value)

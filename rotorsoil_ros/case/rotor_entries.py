@@ -71,12 +71,12 @@ class RotorEntries:
         if chosen is None:
             raise self.faults.error(*place, problem='is missing, and so is that of '
                                                     + '.'.join(map(str, section)))
-        if not isinstance(chosen, schema.Material):
+        if not isinstance(chosen, schema.MaterialEntry):
             return MATERIALS[chosen]
         with self.faults.at(*place, entry=chosen):
             return Material(**dict(chosen))
 
-    def _disc(self, index: int, entry: schema.Disc) -> Disc:
+    def _disc(self, index: int, entry: schema.DiscEntry) -> Disc:
         place = ('rotor', 'discs', index)
         said = {key for key in entry.model_fields_set if getattr(entry, key) is not None}
         by_size = not said.isdisjoint(_DIMENSIONS)
@@ -95,7 +95,7 @@ class RotorEntries:
                 return Disc.cylinder(entry.name, entry.position, **values)
             return Disc(entry.name, entry.position, **values)
 
-    def _bearing(self, index: int, entry: schema.Bearing) -> Bearing:
+    def _bearing(self, index: int, entry: schema.BearingEntry) -> Bearing:
         place = ('rotor', 'bearings', index)
         foundation = self._foundation_of(place, entry)
         stiffness = self._matrix((*place, 'stiffness'), entry.stiffness)
@@ -107,7 +107,7 @@ class RotorEntries:
             return Bearing(name=entry.name, position=entry.position, foundation=foundation,
                            stiffness=stiffness, damping=damping, pedestal=pedestal)
 
-    def _foundation_of(self, place: Place, entry: schema.Bearing) -> str | None:
+    def _foundation_of(self, place: Place, entry: schema.BearingEntry) -> str | None:
         blocks = self.faults.entries.foundations
         if entry.foundation is not None or not blocks:
             return entry.foundation
@@ -147,7 +147,7 @@ class RotorEntries:
                 *place, problem=f'must cover speed_range_rpm, {low:g} to {high:g} rpm, '
                                 f'got {speed_rpm[0]:g} to {speed_rpm[-1]:g}')
 
-    def _pedestal(self, place: Place, entry: schema.Pedestal) -> Pedestal:
+    def _pedestal(self, place: Place, entry: schema.PedestalEntry) -> Pedestal:
         mass = entry.mass
         masses = (mass.xx, mass.zz) if isinstance(mass, schema.MassPerAxis) else (mass, mass)
         with self.faults.at(*place, entry=entry):
@@ -193,14 +193,14 @@ class Unbalances:
                 total[plane] += entry.couple * np.exp(1j * entry.couple_phase)
         return total
 
-    def _vector(self, index: int, entry: schema.Unbalance) -> complex:
+    def _vector(self, index: int, entry: schema.UnbalanceEntry) -> complex:
         discs = [disc.name for disc in self.faults.entries.rotor.discs]
         if entry.disc not in discs:
             raise self.faults.error('unbalances', index, 'disc',
                                     problem=f'must be one of {", ".join(discs)}, got {entry.disc}')
         return complex(self._moment(index, entry) * np.exp(1j * entry.phase))
 
-    def _moment(self, index: int, entry: schema.Unbalance) -> float:
+    def _moment(self, index: int, entry: schema.UnbalanceEntry) -> float:
         place = ('unbalances', index)
         if entry.moment is not None and entry.grade is not None:
             raise self.faults.error(*place, problem='needs either moment or grade, got both')
@@ -216,7 +216,7 @@ class Unbalances:
                                                               'couple')
         return 0.0 if entry.moment is None else entry.moment
 
-    def _permissible(self, index: int, entry: schema.Unbalance, grade: float) -> float:
+    def _permissible(self, index: int, entry: schema.UnbalanceEntry, grade: float) -> float:
         """Return the disc's share of what the grade permits the whole rotor."""
         place = ('unbalances', index)
         rated = entry.rated_speed_rpm

@@ -95,7 +95,7 @@ def _again(detail: ErrorDetails) -> InitErrorDetails:
     return InitErrorDetails(type=kind, loc=detail['loc'], input=detail['input'], ctx=context)
 
 
-class Soil(Entry):
+class SoilEntry(Entry):
     """Half-space, by its shear modulus or by the velocity of its shear waves."""
 
     shear_modulus: Pascal | None = None
@@ -105,7 +105,7 @@ class Soil(Entry):
     loss_factor: Ratio
 
 
-class Support(Entry):
+class SupportEntry(Entry):
     """Which model of the soil stands below the blocks."""
 
     model: Literal['rigid', 'cone', 'infinite_elements', 'table']
@@ -113,7 +113,7 @@ class Support(Entry):
     file: FileName | None = None
 
 
-class Foundation(Entry):
+class FoundationEntry(Entry):
     """Block; its contact is a rectangle or a circle."""
 
     name: Name
@@ -129,7 +129,7 @@ class Foundation(Entry):
     stiffness_file: FileName | None = None
 
 
-class Material(Entry):
+class MaterialEntry(Entry):
     """Shaft material."""
 
     young_modulus: Pascal
@@ -142,8 +142,8 @@ def _given_or_named(value: object) -> str:
 
 
 AnyMaterial: TypeAlias = Annotated[
-    Annotated[Material, Tag(_KEYS)] | Annotated[Literal['steel', 'stainless_steel', 'cast_iron',
-                                                        'aluminium'], Tag(_WORD)],
+    Annotated[MaterialEntry, Tag(_KEYS)]
+    | Annotated[Literal['steel', 'stainless_steel', 'cast_iron', 'aluminium'], Tag(_WORD)],
     Discriminator(_given_or_named)]
 
 
@@ -160,7 +160,7 @@ class Section(Entry):
     added_mass: KilogramPerMetre | None = None
 
 
-class Disc(Entry):
+class DiscEntry(Entry):
     """Rigid disc, by its mass and inertias or by its dimensions."""
 
     name: Name
@@ -229,7 +229,7 @@ class MassPerAxis(Entry):
     zz: Kilogram
 
 
-class Pedestal(Entry):
+class PedestalEntry(Entry):
     """Elastic structure between a bearing's housing and the block."""
 
     mass: Annotated[
@@ -239,7 +239,7 @@ class Pedestal(Entry):
     damping: Damping
 
 
-class Bearing(Entry):
+class BearingEntry(Entry):
     """Bearing and the block below it."""
 
     name: Name
@@ -251,28 +251,28 @@ class Bearing(Entry):
     damping: Annotated[
         Annotated[Damping, Tag(_CONSTANT)] | Annotated[DampingTable, Tag(_TABLE)],
         Discriminator(_over_speed)]
-    pedestal: Pedestal | None = None
+    pedestal: PedestalEntry | None = None
 
 
-class Probe(Entry):
+class ProbeEntry(Entry):
     """Place on the shaft whose motion is wanted."""
 
     name: Name
     position: Metre
 
 
-class Rotor(Entry):
+class RotorEntry(Entry):
     """What turns."""
 
     shaft_height: Metre
     material: AnyMaterial | None = None
     shaft: list[Section]
-    discs: list[Disc] = []
-    bearings: list[Bearing]
-    probes: list[Probe] = []
+    discs: list[DiscEntry] = []
+    bearings: list[BearingEntry]
+    probes: list[ProbeEntry] = []
 
 
-class Unbalance(Entry):
+class UnbalanceEntry(Entry):
     """Unbalance on one disc: a moment, or what a balance grade permits, and a couple."""
 
     disc: Name
@@ -300,7 +300,7 @@ Velocities: TypeAlias = tuple[MetrePerSecond, MetrePerSecond, MetrePerSecond]
 Displacements: TypeAlias = tuple[Metre, Metre, Metre]
 
 
-class Zones(Entry):
+class ZonesEntry(Entry):
     """Limits of housing velocity: those of a group of the standard, or one's own."""
 
     group: Literal[1, 2] | None = None
@@ -316,14 +316,14 @@ class Document(Entry):
     """The whole file."""
 
     name: Name
-    soil: Soil | None = None
-    support: Support
-    foundations: list[Foundation] = []
-    rotor: Rotor
-    unbalances: list[Unbalance] = []
+    soil: SoilEntry | None = None
+    support: SupportEntry
+    foundations: list[FoundationEntry] = []
+    rotor: RotorEntry
+    unbalances: list[UnbalanceEntry] = []
     speed_range_rpm: tuple[Rpm, Rpm]
     uncertainty: Uncertainty | None = None
-    zones: Zones | None = None
+    zones: ZonesEntry | None = None
 
 
 _WHAT = {

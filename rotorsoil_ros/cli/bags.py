@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 import sys
 
-from rotorsoil_ros.case import config, document, ross, writer
+from rotorsoil_ros.case import config, document, ross
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.table import opened
 
@@ -68,7 +68,7 @@ def import_ross(arguments: Namespace) -> int:
                 'ROSS x (horizontal) is our -x, its y (vertical) our z, its axis our y.',
                 'Assumed:', *(f'  {line}' for line in found.assumed),
                 'Not carried over:', *(f'  {line}' for line in lost)]
-    text = writer.text_of(found.content, comments)
+    text = document.text_of(found.content, comments)
     # What is written has to load; a fault is told with the name of the source.
     config.case_of(arguments.rotor, document.parse(text, source=str(arguments.rotor)))
     with opened(arguments.output) as stream:

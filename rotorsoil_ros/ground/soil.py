@@ -53,11 +53,6 @@ class Soil:
         nu = self.poisson_ratio
         return self.shear_wave_speed * math.sqrt(2.0 * (1.0 - nu) / (1.0 - 2.0 * nu))
 
-    @property
-    def complex_shear_modulus(self) -> complex:
-        """G (1 + i eta) [Pa]."""
-        return self.shear_modulus * (1.0 + 1j * self.loss_factor)
-
 
 @dataclass(frozen=True, slots=True)
 class Rectangle:
