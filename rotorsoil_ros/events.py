@@ -1,7 +1,7 @@
 """What can happen to a machine, in frozen words that every sink understands."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 from typing import Any, TypeAlias
 
@@ -113,13 +113,28 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Raw acceleration (n,) [m/s^2] of one channel at its stamps (n,) [ns]; computed or not."""
+    """
+    Raw acceleration of one channel.
+
+    Attributes
+    ----------
+    machine, channel : str, Channel
+        Where.
+    stamp_ns, acceleration : (n,) arrays
+        When [ns], and what was felt [m/s^2].
+    is_synthetic : bool
+        Computed, not measured.
+    turned : (n,) float array
+        Angle by which the sensor says that its axes are turned [rad]; empty: it says nothing.
+
+    """
 
     machine: str
     channel: Channel
     stamp_ns: IntArray
     acceleration: FloatArray
     is_synthetic: bool = False
+    turned: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -162,6 +162,8 @@ class _Reading:
         notes += [f'{channel}: measured as 1X vectors and as raw samples; from the first vector '
                   'on these are used'
                   for channel in sorted(monitor.judge.told_twice)]
+        notes += [f'{channel}: {line}' for channel, refusals in monitor.judge.refusals.items()
+                  for line in refusals.lines()]
         if number := monitor.health.counts['malformed']:
             notes.append(f'{number} messages are malformed and were left out')
         if not self.descriptions:

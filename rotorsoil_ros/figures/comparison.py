@@ -34,8 +34,9 @@ def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
         if np.isfinite(points.phase).any():
             yield (f'polar_{points.channel}', f'{points.channel}: the vectors',
                    polar(points, comparison.run.title))
-    yield 'trend', 'Trend', trend(comparison)
-    yield 'residuals', 'Measured less predicted vectors', residuals(comparison)
+    if comparison.points:  # everything measured may have been refused
+        yield 'trend', 'Trend', trend(comparison)
+        yield 'residuals', 'Measured less predicted vectors', residuals(comparison)
 
 
 def _unit(channel: Channel) -> str:

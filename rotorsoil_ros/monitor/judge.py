@@ -34,6 +34,8 @@ from rotorsoil_ros.monitor.sweep import Sweeps
 from rotorsoil_ros.monitor.vectors.demodulation import Demodulator
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.pairing import Pairing, Runout, Vectors
+from rotorsoil_ros.monitor.vectors.refusal import Refusals
+from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE
 from rotorsoil_ros.monitor.verdict import Account, Teller
 from rotorsoil_ros.monitor.zones import Zones
 
@@ -41,9 +43,6 @@ MOST_NAMES = 16
 REPEAT_NS = NANOSECONDS  # after which a band is told again although the speed has not moved
 MOVED = 1e-3  # share of a speed
 SILENT_TICKS = 2  # without a new speed, after which nothing more is waited for
-
-# Multiples of its standard error below which a vector is noise.
-ABOVE_NOISE = 3.0
 
 
 class Judge:
@@ -138,6 +137,7 @@ class Judge:
                 yield found
                 if found.channel not in self._paired:  # vectors are told besides: they count
                     self._pairing.take_demodulated(found)
+        yield from self._refused(now_ns)
         self._pairing.tick()
         yield from self._matched(is_tick=True)
         heard, self._heard = self._heard, []
@@ -146,7 +146,9 @@ class Judge:
         yield from self._teller.tell(
             now_ns, stale_after_s=stale_after_s, has_data=bool(heard),
             has_phase=any(np.isfinite(each.phase).any() for each in heard),
-            is_steady=self.history.is_steady, counts=self._counts())
+            is_steady=self.history.is_steady, counts=self._counts(),
+            refused=[f'{channel}: {why}' for channel, refusals in self.refusals.items()
+                     if (why := refusals.prevailing())])
 
     def finish(self, now_ns: int) -> Iterator[Event]:
         """Judge what the end of the run has cut short."""
@@ -288,15 +290,31 @@ class Judge:
                          + ', '.join(name + (f' (did you mean {like[0]}?)' if like else '')
                                      for name, like in zip(new, near, strict=True)))
 
+    def _refused(self, now_ns: int) -> Iterator[Remark]:
+        """Tell when raw samples of a channel begin or cease to be refused, and why."""
+        for channel, refusals in self.refusals.items():
+            if (why := refusals.news()) is not None:
+                yield Remark(self.machine, now_ns, Level.WARN if why else Level.OK,
+                             f'{channel}: {why or "raw samples are good again"}')
+
+    @property
+    def refusals(self) -> dict[Channel, Refusals]:
+        """Why stretches of raw samples gave no vector, by channel."""
+        return {channel: each.refusals for channel, each in self._demodulators.items()}
+
     @property
     def told_twice(self) -> set[Channel]:
         """Channels of which both vectors and raw samples came; the vectors count."""
         return self._paired & set(self._demodulators)
 
-    def _counts(self) -> dict[str, float]:
-        return {'without_speed': self._pairing.given_up,
-                'samples_left_out': sum(each.left_out for each in self._demodulators.values()),
-                'raw_channels': len(self._demodulators)}
+    def _counts(self) -> dict[str, float | str]:
+        found: dict[str, float | str] = {
+            'without_speed': self._pairing.given_up,
+            'samples_left_out': sum(each.left_out for each in self._demodulators.values()),
+            'raw_channels': len(self._demodulators)}
+        for channel, refusals in self.refusals.items():
+            found |= {f'{channel}_{key}': value for key, value in refusals.values().items()}
+        return found
 
 
 _ARRAYS = tuple(entry.name for entry in fields(Compared)

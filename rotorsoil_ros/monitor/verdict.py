@@ -1,6 +1,6 @@
 """What is to be said of a machine: of a run in one word, and while it runs in sentences."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
 
 from rotorsoil_ros.channel import Channel
@@ -80,7 +80,8 @@ class Teller:
 
     def tell(
         self, now_ns: int, *, stale_after_s: float, has_data: bool, has_phase: bool,
-        is_steady: Callable[[], bool], counts: Mapping[str, float],
+        is_steady: Callable[[], bool], counts: Mapping[str, float | str],
+        refused: Sequence[str] = (),
     ) -> Iterator[Event]:
         """
         Yield zones, remarks and the diagnostics of a period.
@@ -95,6 +96,8 @@ class Teller:
             Tells whether the speed is constant; limits of zones are made for that.
         counts : mapping
             What else belongs to the values.
+        refused : sequence of str
+            Which raw samples cannot be used at present, and why.
 
         """
         if has_data or (self._heard_ns is not None and now_ns < self._heard_ns):
@@ -105,13 +108,16 @@ class Teller:
         zones = {channel: state.zone or '' for channel, state in
                  self._account.zones.predicted.items()}
         yield Zoned(self._machine, now_ns, zones, {} if stale else dict(self._zones))
-        if self._heard_ns is None:
+        if self._heard_ns is None and not refused:
             return  # a machine without sensors is not stale
         level, summary = self._level(is_steady)
         if stale:
             level, summary = Level.STALE, self._silence()
         elif not has_phase and has_data:
             summary += '; no phase reference: amplitudes only'
+        if refused:  # a sensor without use is no silence, and no fault of the machine
+            level = Level.WARN if stale else max(level, Level.WARN)
+            summary = '; '.join([*refused, summary])
         yield Diagnostics(self._machine, now_ns, level, summary,
                           {**self._values(), **counts}, VIBRATION)
 

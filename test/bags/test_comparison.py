@@ -19,7 +19,8 @@ from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.points import Collector
 from rotorsoil_ros.monitor.rules import Judging, Matching
 from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.cdr import Layout
+from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import inlet
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
@@ -84,6 +85,57 @@ def test_live_and_compare_find_the_same(answered, fan, tick_ns):
         for name in ('stamp_ns', 'speed', 'amplitude', 'phase', 'predicted', 'low', 'reason'):
             np.testing.assert_array_equal(
                 getattr(found[points.channel], name), getattr(points, name), err_msg=name)
+
+
+@pytest.mark.parametrize('tick_ns', [1, 370_000_000])
+def test_live_and_compare_refuse_the_same_samples(answered, fan, tmp_path, tick_ns):
+    """Clipped for a while, frozen, in packets, and with lost and doubled messages."""
+    log = spoiled(answered, tmp_path / 'log.mcap')
+    offline = compare(log, FAN, cache_directory=fan.directory)
+    monitor, _, collector = live(log, fan, tick_ns=tick_ns)
+    refused = [f'{channel}: {line}' for channel, refusals in monitor.judge.refusals.items()
+               for line in refusals.lines()]
+    assert [line for line in offline.remarks if line in refused] == refused
+    for why in ('clipped', 'stands still', 'packets of about 8', 'told twice'):
+        assert [line for line in refused if why in line], why
+    found = {points.channel: points for points in collector.points()}
+    for points in offline.points:
+        for name in ('stamp_ns', 'amplitude', 'phase', 'reason'):
+            np.testing.assert_array_equal(
+                getattr(found[points.channel], name), getattr(points, name), err_msg=name)
+    assert monitor.judge.account.failures() == offline.failures
+
+
+def spoiled(answered, path):
+    """Write speeds and one sensor of a log, its samples spoiled in some seconds."""
+    rail = None
+    with LogFile(path) as log:
+        for batch in bag_reader.batches(
+                answered, lambda topic, _: topic.endswith(('fan_end_housing_x/imu', 'states')),
+                at_most=500):
+            if not batch.topic.endswith('imu'):
+                log.write(batch)
+                continue
+            layout = Layout.of(IMU, batch.payloads[0])
+            rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
+            felt = rows['linear_acceleration']
+            stamps = np.array(batch.log_time_ns)
+            second = (stamps - START) // SECOND
+            felt[(second >= 10) & (second < 14)] = 0.25
+            dwells = (second >= 21) & (second < 25)
+            if dwells.any():
+                rail = 0.6 * np.abs(felt[dwells, 0]).max() if rail is None else rail
+                felt[dwells] = felt[dwells].clip(-rail, rail)
+            together = (second >= 30) & (second < 34)
+            number = np.arange(len(stamps))
+            stamps = np.where(together, stamps[np.minimum(number // 8 * 8 + 7, len(number) - 1)]
+                              + 2000 * (number % 8), stamps)
+            rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, SECOND)
+            times = np.where(second >= 38, 2, 1)
+            cdrs = np.repeat(rows.view(np.uint8).reshape(len(rows), -1), times, axis=0)
+            log.write(Records(batch.topic, IMU, np.repeat(stamps, times).tolist(), [
+                bytes(cdr) for cdr in cdrs]))
+    return path
 
 
 def test_no_peak_of_the_demonstration_is_missing(answered, fan):

@@ -1,4 +1,4 @@
-"""Which once-per-turn vector is in raw samples? Found while they come."""
+"""Which once-per-turn vector is in raw samples? Found while they come, refused where unsure."""
 
 from collections.abc import Iterator, Sequence
 import math
@@ -7,32 +7,39 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.events import Demodulated, NANOSECONDS, Samples
 from rotorsoil_ros.monitor.vectors.history import History
-from rotorsoil_ros.monitor.vectors.orders import demodulate, LARGEST_ACCELERATION, OrderVector
+from rotorsoil_ros.monitor.vectors.orders import LARGEST_ACCELERATION, OrderVector, Turning
+from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
+from rotorsoil_ros.monitor.vectors.stretch import Finding, Stretch, TOLD
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
-FITTED = (1, 2, 3)  # a harmonic that is there and not fitted would disturb the others
-TOLD = 2
 MOST = 1 << 16  # samples of a channel that wait for their speed
+
+# Axes that a sensor says are turned by more than this are not those of the machine [rad].
+_TURNED = math.radians(5.0)
 
 
 class Demodulator:
     """Keeps the samples of one channel until enough turns of the rotor are known for them."""
 
-    def __init__(self, machine: str, channel: Channel, history: History, *, turns: float) -> None:
+    def __init__(
+        self, machine: str, channel: Channel, history: History, *, turns: float,
+        has_filter: bool = False,
+    ) -> None:
         self._machine, self._channel = machine, channel
         self._history = history
-        self._turns = turns
-        self._parts: list[tuple[IntArray, FloatArray]] = []
+        self._turns, self._has_filter = turns, has_filter
+        self._parts: list[tuple[IntArray, FloatArray, FloatArray]] = []
         self._count = 0
         self._done_ns = -1
         self.left_out = 0
+        self.refusals = Refusals()
 
     def take(self, samples: Samples) -> None:
         """Keep samples; the oldest are left out if nobody tells the speed."""
-        self._parts.append((samples.stamp_ns, samples.acceleration))
+        turned = samples.turned if len(samples.turned) else np.zeros(len(samples.stamp_ns))
+        self._parts.append((samples.stamp_ns, samples.acceleration, turned))
         self._count += len(samples.stamp_ns)
         while self._count > MOST and len(self._parts) > 1:
             gone = len(self._parts.pop(0)[0])
@@ -44,33 +51,39 @@ class Demodulator:
         told = self._history.track()[0]
         if not self._parts or not len(told):
             return
-        stamps, values = self._gathered(int(told[0]))
+        stamps, values, turned = self._gathered(int(told[0]))
         found = []
         while (known := int(np.searchsorted(stamps, told[-1], side='right'))):
-            vector, taken = self._first(stamps[:known], values[:known])
+            vector, taken = self._first(stamps[:known], values[:known], turned[:known])
             if not taken:
                 break
             self._done_ns = int(stamps[taken - 1])
-            stamps, values = stamps[taken:], values[taken:]
+            stamps, values, turned = stamps[taken:], values[taken:], turned[taken:]
             if vector is not None:
                 found.append(vector)
-        self._parts, self._count = [(stamps, values)], len(stamps)
+        self._parts, self._count = [(stamps, values, turned)], len(stamps)
         if found:
             yield self._event(found)
 
-    def _gathered(self, begin_ns: int) -> tuple[IntArray, FloatArray]:
+    def _gathered(self, begin_ns: int) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return what has been kept, in order; too late or before every speed is left out."""
-        stamps = np.concatenate([stamps for stamps, _ in self._parts])
-        values = np.concatenate([values for _, values in self._parts])
+        stamps, values, turned = (np.concatenate(part) for part in zip(
+            *self._parts, strict=True))
         chosen = ((stamps >= begin_ns) & (stamps > self._done_ns)
                   & (np.abs(values) <= LARGEST_ACCELERATION))
         self.left_out += len(stamps) - int(np.count_nonzero(chosen))
-        stamps, values = stamps[chosen], values[chosen]
-        order = np.argsort(stamps, kind='stable')
-        return stamps[order], values[order]
+        stamps, values, turned = stamps[chosen], values[chosen], turned[chosen]
+        # By value where stamps are equal: a log may hold such samples in another order.
+        order = np.lexsort((values, stamps))
+        stamps, values, turned = stamps[order], values[order], turned[order]
+        again = np.concatenate([[False], (np.diff(stamps) == 0) & (np.diff(values) == 0.0)])
+        if again.any():
+            self.refusals.left_out['samples told twice'] += int(np.count_nonzero(again))
+            stamps, values, turned = stamps[~again], values[~again], turned[~again]
+        return stamps, values, turned
 
     def _first(
-        self, stamps: IntArray, values: FloatArray,
+        self, stamps: IntArray, values: FloatArray, turned: FloatArray,
     ) -> tuple[tuple[int, OrderVector] | None, int]:
         """Return stamp and vector of the first stretch, and how many samples it takes."""
         # Counted from its own first sample, it does not matter when this is asked.
@@ -78,21 +91,27 @@ class Demodulator:
         if track is None:
             return None, 0
         time = (stamps - zero_ns) / NANOSECONDS
-        angle, _, _ = track.at(time)
-        end = int(np.argmax(angle - angle[0] >= self._turns * RADIANS_PER_TURN))
+        at = Turning.of(time, track)
+        end = int(np.argmax(at.angle - at.angle[0] >= self._turns * RADIANS_PER_TURN))
         if not end:
             return None, 0
-        try:
-            vector = demodulate(time[:end], values[:end], track, orders=FITTED)
-        except NotSolvedError:
+        finding = Finding(Stretch(at.rows(slice(0, end)), values[:end], float(time[end]),
+                                  self._turns, self._has_filter), track)
+        tilt = float(np.max(turned[:end]))
+        found: OrderVector | Refusal = finding.vector() if tilt <= _TURNED else Refusal(
+            Flaw.TURNED, f'the orientation of the sensor turns its axes by '
+                         f'{math.degrees(tilt):.0f} deg')
+        self.refusals.left_out.update(finding.left_out)
+        self.refusals.note(found if isinstance(found, Refusal) else None)
+        if isinstance(found, Refusal):
             self.left_out += end
             return None, end
-        return (zero_ns + round(vector.time * NANOSECONDS), vector), end
+        return (zero_ns + round(found.time * NANOSECONDS), found), end
 
     def _event(self, found: Sequence[tuple[int, OrderVector]]) -> Demodulated:
-        vectors = np.array([vector.displacement[:TOLD] for _, vector in found])
+        vectors = np.array([vector.displacement for _, vector in found])
         told = np.array([[0.0 if vector.has_phase else math.nan] for _, vector in found])
         return Demodulated(
             self._machine, self._channel, np.array([stamp for stamp, _ in found]),
-            np.array([vector.speed for _, vector in found]), FITTED[:TOLD], np.abs(vectors),
+            np.array([vector.speed for _, vector in found]), TOLD, np.abs(vectors),
             np.angle(vectors) + told, np.array([vector.deviation[0] for _, vector in found]))

@@ -1,11 +1,13 @@
 """The once-per-turn vector that is in a measured signal."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
@@ -17,6 +19,13 @@ _SAMPLES_PER_UNKNOWN = 2
 
 # Above this condition number the orders cannot be told apart (aliasing, one-sided gaps).
 _WORST_CONDITION = 1e6
+
+# The residual is averaged over so many blocks; what repeats in each of them is no noise, and what
+# differs is told by fewer degrees of freedom, because the fit has used some.
+_BLOCKS, _FREE_BLOCKS = 10, 8
+
+# Batch means of few blocks can be small by chance: never below this share of the white formula.
+_LEAST_OF_WHITE = 0.3
 
 LARGEST_ACCELERATION = 1e9  # [m/s^2]; no sensor tells more, and its square fits into a double
 
@@ -113,6 +122,65 @@ def turns_with(time: FloatArray, speed: FloatArray, angle: FloatArray) -> bool:
     return float(np.median(astray)) < _ASTRAY
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Turning:
+    """Where the rotor was when samples were taken: times [s] and what a track tells, (n,) each."""
+
+    time: FloatArray
+    angle: FloatArray
+    speed: FloatArray
+    rate: FloatArray
+
+    @classmethod
+    def of(cls, time: FloatArray, track: SpeedTrack) -> 'Turning':
+        """Ask a track."""
+        return cls(time, *track.at(time))
+
+    def rows(self, which: Any) -> 'Turning':
+        """Return some of it."""
+        return Turning(*(getattr(self, name)[which] for name in self.__slots__))
+
+    @property
+    def turns(self) -> float:
+        """How many turns the samples span."""
+        return float(np.ptp(self.angle)) / RADIANS_PER_TURN if len(self.time) else 0.0
+
+    @property
+    def middle(self) -> float:
+        """Middle of the samples [s]."""
+        return 0.5 * (float(self.time.min()) + float(self.time.max()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """
+    What samples are made of, by least squares.
+
+    Attributes
+    ----------
+    vectors, change : (k,) complex array
+        Displacement at the middle, and how it changes over half the stretch [m].
+    white : (k,) float array
+        Standard error of a vector, were the residual white noise [m].
+    residual : (n,) float array
+        What is left [m/s^2].
+    turning : (n,) complex array
+        exp(i theta).
+
+    """
+
+    vectors: ComplexArray
+    change: ComplexArray
+    white: FloatArray
+    residual: FloatArray
+    turning: ComplexArray
+
+    @property
+    def power(self) -> float:
+        """Square sum of what is left."""
+        return float(self.residual @ self.residual)
+
+
 @dataclass(frozen=True, slots=True)
 class OrderVector:
     """
@@ -123,9 +191,9 @@ class OrderVector:
     time, speed : float
         Of the middle of the stretch [s], [rad/s].
     displacement : (k,) complex array
-        x(t) = Re(sum X_n exp(i n theta)), zero-to-peak [m].
+        x(t) = Re(sum X_n exp(i n theta)), zero-to-peak [m]; NaN where an order is not told.
     deviation : (k,) float array
-        Standard error of |X_n| that the residual of the fit implies [m].
+        Standard error of |X_n| by batch means of the residual [m].
     has_phase : bool
         Whether theta is the true rotor angle; else only |X_n| has a meaning.
 
@@ -143,29 +211,43 @@ def demodulate(
     orders: Sequence[int] = (1, 2, 3),
 ) -> OrderVector:
     """
-    Fit displacement vectors of several orders to acceleration samples.
+    Return displacement vectors of several orders in acceleration samples.
 
     Parameters
     ----------
     time : (n,) float array
-        True sample times [s], in any order, with gaps or not.
+        True sample times [s], ascending, with gaps or not.
     acceleration : (n,) float array
-        Of a fixed direction [m/s^2]; a constant part, such as gravity, is fitted away.
+        Of a fixed direction [m/s^2]; a constant part, such as gravity, and a drift are fitted
+        away.
     track : SpeedTrack
         Speed of the rotor, covering the samples.
     orders : sequence of int
         Multiples of the speed; harmonics that are present should be named, or they disturb.
-
-    Returns
-    -------
-    OrderVector
-        At the middle of the samples.
 
     Raises
     ------
     NotSolvedError
         If the stretch is shorter than two turns, has too few samples, or cannot part the
         orders.
+
+    """
+    turning = Turning.of(time, track)
+    found = fit(turning, acceleration, orders)
+    middle = turning.middle
+    speed = float(track.at(np.array([middle]))[1][0])
+    return OrderVector(middle, speed, found.vectors,
+                       deviations(found, orders, speed=speed), track.has_phase)
+
+
+def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> Fit:
+    """
+    Fit displacement vectors of several orders, an offset and a drift to acceleration samples.
+
+    Raises
+    ------
+    NotSolvedError
+        As `demodulate`.
 
     Notes
     -----
@@ -175,59 +257,75 @@ def demodulate(
     needs no resampling, so that gaps and jitter bias nothing.
 
     """
-    angle, speed, rate = track.at(time)
-    middle = 0.5 * (float(time.min()) + float(time.max())) if len(time) else 0.0
-    unknowns = 4 * len(orders) + 1
-    turns = float(np.ptp(angle)) / RADIANS_PER_TURN if len(time) else 0.0
-    if turns < _FEWEST_TURNS or len(time) < _SAMPLES_PER_UNKNOWN * unknowns:
+    number, unknowns = len(turning.time), 4 * len(orders) + 2
+    if turning.turns < _FEWEST_TURNS or number < _SAMPLES_PER_UNKNOWN * unknowns:
         raise NotSolvedError(f'a vector needs {_FEWEST_TURNS:g} turns and '
                              f'{_SAMPLES_PER_UNKNOWN * unknowns} samples or more, got '
-                             f'{turns:.2g} turns, {len(time)} samples')
-    reach = max(float(np.ptp(time)) / 2.0, np.finfo(float).tiny)
-    along = (time - middle) / reach
-    columns = []
-    for order in orders:
-        turning = np.exp(1j * order * angle)
-        value = (1j * order * rate - (order * speed) ** 2) * turning
-        change = value * along + 2j * order * speed / reach * turning
-        columns += [value.real, -value.imag, change.real, -change.imag]
-    system = np.column_stack([*columns, np.ones_like(time)])
-    scale = np.linalg.norm(system, axis=0)
-    left, singular, right = np.linalg.svd(system / scale, full_matrices=False)
-    if not singular[0] <= _WORST_CONDITION * singular[-1]:
+                             f'{turning.turns:.2g} turns, {number} samples')
+    once, system = _system(turning, orders)
+    # Normal equations: columns of one length are nearly orthogonal, so that little is lost, and
+    # they cost a fraction of a decomposition of all rows.
+    gram = system @ system.T
+    scale = np.sqrt(np.diag(gram))
+    gram /= scale * scale[:, None]
+    try:
+        inverse = np.linalg.inv(gram)
+    except np.linalg.LinAlgError:
+        raise NotSolvedError('the samples cannot tell the orders apart') from None
+    # What the smallest eigenvalue adds to the trace: no decomposition is needed to see it.
+    if not 0.0 < np.trace(inverse) * len(gram) <= _WORST_CONDITION**2:
         raise NotSolvedError('the samples cannot tell the orders apart')
-    inverse = right.T / singular / scale[:, None]
-    solution = inverse @ (left.T @ acceleration)
-    residual = acceleration - system @ solution
-    variance = residual @ residual / (len(time) - unknowns)
-    vectors = solution[:-1].reshape(-1, 4)
-    spread = np.sum(inverse**2, axis=1)[:-1].reshape(-1, 4)[:, :2].max(axis=1)
-    return OrderVector(
-        middle, float(track.at(np.array([middle]))[1][0]), vectors[:, 0] + 1j * vectors[:, 1],
-        np.sqrt(variance * spread), track.has_phase)
+    inverse /= scale * scale[:, None]
+    solution = inverse @ (system @ acceleration)
+    residual = acceleration - solution @ system
+    variance = float(residual @ residual) / (number - unknowns)
+    parts = solution[:-2].reshape(-1, 4)
+    spread = np.diag(inverse)[:-2].reshape(-1, 4)[:, :2].max(axis=1)
+    return Fit(parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3],
+               np.sqrt(variance * spread), residual, once)
 
 
-def order_vectors(
-    time: FloatArray, acceleration: FloatArray, track: SpeedTrack, *, turns: float,
-    orders: Sequence[int] = (1, 2, 3),
-) -> Iterator[OrderVector]:
+def deviations(found: Fit, orders: Sequence[int], *, speed: float) -> FloatArray:
     """
-    Yield vectors of consecutive stretches of a signal.
+    Return the standard errors of the first k fitted orders at a speed [rad/s], (k,) [m].
 
-    Parameters
-    ----------
-    time, acceleration, track, orders
-        As `demodulate`.
-    turns : float
-        Length of a stretch. Stretches that cannot be solved are left out.
+    Notes
+    -----
+    By batch means: harmonics that were not fitted are locked to the turn and average out, which
+    the white formula does not see; a tone beside the order beats from block to block, which it
+    does not see either. What the linear X(t) neglects is added.
 
     """
-    order = np.argsort(time, kind='stable')
-    time, acceleration = time[order], acceleration[order]
-    angle, _, _ = track.at(time)
-    stretch = np.floor((angle - angle[0]) / (turns * RADIANS_PER_TURN))
-    for ends in np.split(np.arange(len(time)), np.flatnonzero(np.diff(stretch)) + 1):
-        try:
-            yield demodulate(time[ends], acceleration[ends], track, orders=orders)
-        except NotSolvedError:
-            continue
+    order = np.asarray(orders)
+    edges = block_edges(len(found.residual))
+    back = np.conj(found.turning)
+    against = np.stack([found.residual * (back if each == 1 else back**each) for each in orders])
+    blocks = np.add.reduceat(against, edges[:-1], axis=1) * (2.0 / np.diff(edges))
+    batch = np.sqrt(np.sum(np.abs(blocks) ** 2, axis=1) / (2.0 * _FREE_BLOCKS * _BLOCKS))
+    batch = np.maximum(batch / (order * speed) ** 2, _LEAST_OF_WHITE * found.white[:len(order)])
+    size = np.maximum(np.abs(found.vectors[:len(order)]), np.finfo(float).tiny)
+    return np.asarray(np.hypot(batch, np.abs(found.change[:len(order)]) ** 2 / (4.0 * size)))
+
+
+def block_edges(number: int) -> IntArray:
+    """Return where the blocks of a residual begin and end, (11,)."""
+    return np.arange(_BLOCKS + 1) * number // _BLOCKS
+
+
+def _system(
+    turning: Turning, orders: Sequence[int],
+) -> tuple[ComplexArray, npt.NDArray[np.float64]]:
+    """Return exp(i theta), (n,), and the columns that a fit needs, as rows: (4 k + 2, n)."""
+    time, number = turning.time, len(turning.time)
+    reach = max(float(np.ptp(time)) / 2.0, np.finfo(float).tiny)
+    along = (time - turning.middle) / reach
+    once, square = np.exp(1j * turning.angle), turning.speed**2
+    system = np.empty((4 * len(orders) + 2, number))
+    for row, order in enumerate(orders):
+        turned = once if order == 1 else once**order
+        value = (1j * order * turning.rate - order**2 * square) * turned
+        change = value * along + (2j * order / reach) * turning.speed * turned
+        system[4 * row], system[4 * row + 1] = value.real, -value.imag
+        system[4 * row + 2], system[4 * row + 3] = change.real, -change.imag
+    system[-2], system[-1] = along, 1.0
+    return once, system

@@ -1,0 +1,120 @@
+"""What verbs and log say of raw samples that may not become vectors."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.comparison import compare
+from rotorsoil_ros.bags.predict import predict
+from rotorsoil_ros.bags.writer import LogFile
+from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.cli import main
+from rotorsoil_ros.monitor.verdict import Verdict
+from rotorsoil_ros.wire.cdr import Layout
+from rotorsoil_ros.wire.definitions import IMU
+from rotorsoil_ros.wire.messages import Records
+
+from records import read_all, STORE
+
+FAN = Path('config/plant_fan.yaml')
+BUNCHED = Path(__file__).parent / 'cases' / 'imu_bunched_stamps' / 'imu_bunched.mcap'
+X = 'drive_end_housing_x'
+WHY = 'stamps come in packets of about 16: when each sample was taken is not told'
+
+
+@pytest.fixture(scope='module')
+def fan(tmp_path_factory):
+    return Machine.load(FAN, cache_directory=tmp_path_factory.mktemp('tables'))
+
+
+def test_bunched_stamps_give_no_zone_and_no_verdict(fan, tmp_path, capsys):
+    out = tmp_path / 'c'
+    assert main(['compare', str(BUNCHED), str(FAN), '-o', str(out),
+                 '--cache', str(fan.directory)]) == 1
+    said = capsys.readouterr().out
+    assert f'note: {X}: 14 of 14 stretches refused: {WHY}' in said
+    assert said.splitlines()[-1].split() == ['verdict', 'undecided']
+    content = json.loads((out / 'comparison.json').read_text())
+    assert any(WHY in line for line in content['remarks'])
+    assert not [entry for entry in content['zones'] if entry['source'] == 'measured']
+    assert WHY in (out / 'report.html').read_text()
+    assert not list(out.glob('*.png'))  # there is nothing to draw
+
+
+def test_bunched_stamps_are_a_warning_that_says_why(fan, tmp_path):
+    predict(fan, BUNCHED, tmp_path / 'o.mcap')
+    told = [STORE.deserialize_cdr(payload, 'diagnostic_msgs/msg/DiagnosticArray').status
+            for topic, _, payload in read_all(tmp_path / 'o.mcap') if topic == '/diagnostics']
+    vibration = [status for each in told for status in each if 'vibration' in status.name]
+    assert vibration
+    for status in vibration:
+        assert status.level == 1
+        assert WHY in status.message
+        assert 'measured_zone' not in ' '.join(value.key for value in status.values)
+    values = {value.key: value.value for value in vibration[-1].values}
+    assert values[f'{X}_refused'] == values[f'{X}_refused_packets'] == '14'
+    assert values[f'{X}_refused_because'] == WHY
+    topics = {topic for topic, _, _ in read_all(tmp_path / 'o.mcap')}
+    assert not {topic for topic in topics if topic.endswith(('residual', 'demodulated/amplitude'))}
+
+
+def messages(rows):
+    """Return the bytes of every message, those between its numbers too."""
+    return [bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]
+
+
+def restamped(target, *, change=None):
+    """Write the case with evenly spaced stamps, and the samples changed."""
+    first, number = None, 0
+    with LogFile(target) as log:
+        for batch in bag_reader.batches(BUNCHED, lambda *_: True, at_most=500):
+            if not batch.topic.endswith('imu'):
+                log.write(batch)
+                continue
+            layout = Layout.of(IMU, batch.payloads[0])
+            rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
+            stamps = rows['header.stamp.sec'].astype(np.int64) * 10**9 + rows[
+                'header.stamp.nanosec']
+            first = stamps[0] if first is None else first
+            stamps = first + np.arange(number, number + len(rows)) * 1_250_000
+            number += len(rows)
+            rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, 10**9)
+            if change is not None:
+                change(rows['linear_acceleration'])
+            log.write(Records(batch.topic, IMU, stamps.tolist(), messages(rows)))
+    return target
+
+
+def test_the_same_samples_evenly_stamped_are_in_zone_a(fan, tmp_path):
+    """The truth that was put in: 10.37 um, 1.14 mm/s rms."""
+    found = compare(restamped(tmp_path / 'even.mcap'), FAN, cache_directory=fan.directory)
+    [zone] = [entry for entry in found.zones if entry.source == 'measured']
+    assert zone.zone == 'A'
+    assert 1e3 * zone.velocity == pytest.approx(1.14, abs=0.01)
+    assert found.verdict == Verdict.PASSES
+    assert not [line for line in found.remarks if 'refused' in line]
+
+
+def clip(felt):
+    felt[:, 0] = felt[:, 0].clip(-0.06, 0.06)  # of 0.11 m/s^2
+
+
+def freeze(felt):
+    felt[:, 0] = 0.1
+
+
+def hold(felt):
+    felt[:] = felt[np.arange(len(felt)) // 5 * 5]
+
+
+@pytest.mark.parametrize('change, why', [(clip, 'clipped at'), (freeze, 'sensor stands still'),
+                                         (hold, 'values are held')])
+def test_values_of_no_motion_are_no_verdict(fan, tmp_path, change, why):
+    log = restamped(tmp_path / 'log.mcap', change=change)
+    found = compare(log, FAN, cache_directory=fan.directory)
+    assert found.verdict == Verdict.UNDECIDED
+    assert not [entry for entry in found.zones if entry.source == 'measured']
+    assert any(f'stretches refused: {why}' in line for line in found.remarks)
