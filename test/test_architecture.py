@@ -38,7 +38,7 @@ LONGEST_ROOM, SHORTEST_ROOM = 400, 60
 UNDER_WAY = {
     'rotorsoil_ros.cli.demo',
     'rotorsoil_ros.cli.pictures',
-    'rotorsoil_ros.monitor.identification', 'twice',
+    'twice',
 }
 
 

@@ -67,7 +67,8 @@ def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[st
         if arguments.write_case is not None:
             raise InputError('--write-case: needs --identify or --identify-unbalance')
         return
-    from rotorsoil_ros.monitor.identification import describe, identify_case, Wanted, write_case
+    from rotorsoil_ros.monitor.identification.case import identify_case, Wanted
+    from rotorsoil_ros.monitor.identification.words import describe, write_case
 
     wanted = Wanted(
         scalars=arguments.identify, planes=arguments.plane,

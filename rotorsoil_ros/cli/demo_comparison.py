@@ -14,12 +14,8 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.figures.report import write_report
 from rotorsoil_ros.monitor.comparison import Comparison
-from rotorsoil_ros.monitor.identification import (
-    describe,
-    Identification,
-    identify_case,
-    Wanted,
-)
+from rotorsoil_ros.monitor.identification.case import Identification, identify_case, Wanted
+from rotorsoil_ros.monitor.identification.words import describe
 from rotorsoil_ros.screen import recorder
 
 CASE, PLANE, SOIL = 'plant_fan', 'wheel', 'soil.shear_modulus'
@@ -84,18 +80,17 @@ def put_in(comparison: Comparison, moment: float, *, start_ns: int) -> tuple[flo
 
 
 def _print(found: Identification, comparison: Comparison, *, start_ns: int) -> None:
-    assert found.scalars is not None
     case = comparison.expectation.case
     given = float(np.abs(case.unbalance[comparison.expectation.table.planes.index(PLANE)]))
     first, last = put_in(comparison, given, start_ns=start_ns)
-    start, growth = (complex(found.unbalance.moment[found.columns.index(name)])
+    start, growth = (complex(found.moment[found.columns.index(name)])
                      for name in (PLANE, f'growth of {PLANE}'))
     print(f'{CASE}: SYNTHETIC sensors of {comparison.run.time[-1]:.0f} s, '
           'compared with the case')
     print(f'  {"":44s} {"put in":>8s} {"found":>8s}')
     for name, truth, value in (
             ('G of the ground over that of the case', _TRUTH.shear_modulus_factor,
-             float(found.scalars.factor[0])),
+             float(found.factor[0])),
             (f'unbalance of the {PLANE}, first vector [kg m]', first, abs(start)),
             (f'unbalance of the {PLANE}, last vector [kg m]', last, abs(start + growth))):
         print(f'  {name:44s} {truth:8.4f} {value:8.4f}')
