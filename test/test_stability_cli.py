@@ -7,13 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotorsoil_ros.bags.comparison import compare
+from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.loading import Machine
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.events import Diagnostics, Level, Predicted, Remark
 from rotorsoil_ros.machine.stability import stability
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rpm_to_rad_s
+from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 CASES = Path(__file__).parent / 'cases'
 UNSTABLE = {'unst': (0.0724, 0.1052), 'unstable_without_a_word': (0.0925 / (2.0 * math.pi),)}
@@ -102,6 +107,25 @@ def test_comparison_is_told_and_no_growing_mode_is_a_resonance(loaded):
     found = Expectation.of(machine.case, machine.directory)
     assert 'unstable at all speeds looked at' in found.note
     assert all(resonance.damping_ratio > 0.0 for resonance in found.resonances)
+
+
+def test_comparison_of_a_machine_that_is_unstable_never_passes(loaded, tmp_path):
+    machine = loaded['unst']
+    channel = next(name for name in machine.table.channels if name.is_housing)
+    stamps = [SECOND * (1 + row) for row in range(20)]
+
+    def records(topic, names, place, value):
+        numbers = np.full((20, 3, 1), np.nan)
+        numbers[:, place] = value
+        return Records(f'/m/{topic}', JOINT_STATE, stamps,
+                       JointStateWriter(names).write(stamps, numbers))
+
+    with LogFile(tmp_path / 'log.mcap') as log:
+        log.write(records('joint_states', ['rotor'], 1, 100.0))
+        log.write(records('measured/amplitude', [channel], 0, 1e-6))
+    found = compare(tmp_path / 'log.mcap', machine)
+    assert found.verdict == Verdict.FAILS
+    assert found.failures[0].startswith('unstable at all speeds looked at')
 
 
 @pytest.mark.parametrize('key, value, says', [

@@ -97,7 +97,8 @@ class ZoneLimits:
 # Of the boundaries B/C and C/D: how far an alarm lies above a baseline, and the most it may be.
 _ABOVE_BASELINE, _MOST = 0.25, 1.25
 
-# From published charts of the standard, not from its text; displacement and velocity of one row
+# Quoted from general knowledge, not from the text of the standard, which is not public, and for
+# displacement not from any public source; all that was checked: displacement and velocity of one row
 # meet at 12.5 Hz (group 1) and at 10 Hz (group 2).
 ISO_10816_3 = {
     1: ZoneLimits('ISO 10816-3:2009 group 1', (2.3e-3, 4.5e-3, 7.1e-3),
