@@ -97,9 +97,9 @@ class ZoneLimits:
 # Of the boundaries B/C and C/D: how far an alarm lies above a baseline, and the most it may be.
 _ABOVE_BASELINE, _MOST = 0.25, 1.25
 
-# Quoted from general knowledge, not from the text of the standard, which is not public, and for
-# displacement not from any public source; all that was checked: displacement and velocity of one row
-# meet at 12.5 Hz (group 1) and at 10 Hz (group 2).
+# Quoted from general knowledge: the text of the standard is not public, and for displacement no
+# public source was found. All that was checked: displacement and velocity of one row meet at
+# 12.5 Hz (group 1) and at 10 Hz (group 2).
 ISO_10816_3 = {
     1: ZoneLimits('ISO 10816-3:2009 group 1', (2.3e-3, 4.5e-3, 7.1e-3),
                   (3.5e-3, 7.1e-3, 11.0e-3), (29e-6, 57e-6, 90e-6), (45e-6, 90e-6, 140e-6)),
