@@ -75,7 +75,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'rotorsoil = {NAME}.cli:main',
-            f'rotorsoil_node = {NAME}.node.node:main',
+            f'rotorsoil_node = {NAME}.node:main',
         ],
     },
 )

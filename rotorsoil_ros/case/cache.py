@@ -1,6 +1,6 @@
 """Where tables wait for the next start, and how one knows that they are the right ones."""
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 import hashlib
 import json
@@ -16,6 +16,9 @@ import numpy as np
 
 # To be raised whenever the physics gives other numbers for the same case: old tables must go.
 ALGORITHM = 3
+
+# A table that one user computes serves the service of another: temporary files are private.
+READABLE = 0o644
 
 _KEY = '__key__'
 _LOG = logging.getLogger(__name__)
@@ -65,9 +68,14 @@ def _plain(value: Any) -> object:
     raise TypeError(f'{type(value).__name__} cannot be part of a key')
 
 
-def _label(key: str, arrays: Iterable[str]) -> str:
-    # The names too: damage to a zip's directory can lose an array without a checksum failing.
-    return ' '.join([key, *sorted(arrays)])
+def _label(key: str, arrays: Mapping[str, np.ndarray]) -> str:
+    # Names and content too: damage to a zip's directory can lose or exchange an array without a
+    # checksum of the zip failing, and a copy may be torn.
+    content = hashlib.sha256()
+    for name in sorted(arrays):
+        content.update(f'{name} {arrays[name].dtype} {arrays[name].shape}'.encode())
+        content.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return f'{key} {content.hexdigest()}'
 
 
 @dataclass(frozen=True)
@@ -121,6 +129,7 @@ class Cache:
                 partial = stream.name
                 labelled: dict[str, Any] = {_KEY: np.array(_label(key, arrays)), **arrays}
                 np.savez(stream, **labelled)
+                os.fchmod(stream.fileno(), READABLE)
             os.replace(partial, path)
         except OSError as error:
             _LOG.warning('%s cannot be written: %s', path, error)

@@ -1,6 +1,6 @@
 """The node: its life cycle around one watch per machine, and the process that runs it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 import gc
 import signal
@@ -60,6 +60,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self._diagnostics: LifecyclePublisher | None = None
         self._bench: Bench | None = None
         self._turn, self._topics = 0, set[str]()
+        self._namesakes = 1
         self._held = ExitStack()
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -172,6 +173,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         turn, self._turn = self._turn, (self._turn + 1) % len(self._watches)
         if turn == 0:
             self._topics = {name for name, _ in self.get_topic_names_and_types()}
+            self._look_for_namesakes()
             if self._bench is not None:
                 self._bench.step()
             if self._log is not None:
@@ -181,6 +183,16 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self._watches[turn].tick(
             self._now_ns(), stale_after_s=float(self.settings.value('stale_after_s')),
             topics=self._topics)
+
+    def _look_for_namesakes(self) -> None:
+        """Tell if another node has the same name: both answer on the same topics."""
+        own = self.get_name(), self.get_namespace()
+        count = self.get_node_names_and_namespaces().count(own)
+        if count > 1 and count != self._namesakes:
+            self.get_logger().error(
+                f'{count} nodes are called {self.get_fully_qualified_name()}: answers are given '
+                f'more than once; rename one with __node or __ns')
+        self._namesakes = count
 
     def _report_log(self, log: RunLog) -> None:
         """Say on /diagnostics, and so in the log itself, how logging goes."""
@@ -220,7 +232,7 @@ class Stop:
     def __init__(self) -> None:
         self.requested = False
         self._interrupts = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._take)
 
     @contextmanager
@@ -241,6 +253,37 @@ class Stop:
             raise KeyboardInterrupt
 
 
+class Survived:
+    """
+    Tells what a callback raised, each kind once, and goes on.
+
+    The one place in the package that does so: a callback is made to raise nothing, and what it
+    raises all the same is a fault of ours or of a library, of which no list can be complete. A
+    node that watches fifty machines must not fall silent for one message of one of them.
+    """
+
+    def __init__(self, complain: Callable[[str], object]) -> None:
+        self._complain = complain
+        self._told: set[str] = set()
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> bool:
+        if not isinstance(error, Exception) or isinstance(error, ExternalShutdownException):
+            return False
+        where = traceback.extract_tb(trace)[-1]
+        place = f'{type(error).__name__} in {where.name}, line {where.lineno}'
+        if place not in self._told:
+            self._told.add(place)
+            self._complain(''.join(traceback.format_exception(kind, error, trace))
+                           + 'The node goes on; please report this.')
+        return True
+
+
 @contextmanager
 def _refused_by_ros() -> Iterator[None]:
     """Turn what rclpy says of its arguments into one line for a user."""
@@ -258,7 +301,7 @@ def _refused_by_ros() -> Iterator[None]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; return 0, or 2 where it could not start."""
+    """Run the node until it is asked to stop; return 0, or 2 where it could not start."""
     stop = Stop()
     with ExitStack() as stack:
         try:
@@ -276,9 +319,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     return BAD_INPUT
             sys.setswitchinterval(SWITCH_S)
             gc.freeze()  # tables and classes stay: looking for garbage among them costs latency
+            survived = Survived(node.get_logger().error)
             while not stop.requested and node.context.ok():
-                # Returns after SPIN_S; `spin_once` would return to Python after every message.
-                executor.spin_until_future_complete(Future(), timeout_sec=SPIN_S)
+                with survived:
+                    # Returns after SPIN_S; `spin_once` would return after every message.
+                    executor.spin_until_future_complete(Future(), timeout_sec=SPIN_S)
         except InputError as error:
             get_logger(NODE_NAME).error(str(error))
             return BAD_INPUT

@@ -166,3 +166,20 @@ def test_directory_is_the_chosen_one_then_the_environment_then_the_users(tmp_pat
     assert cache.directory() == Path('/b/rotorsoil')
     monkeypatch.delenv('XDG_CACHE_HOME')
     assert cache.directory() == Path('/c/.cache/rotorsoil')
+
+
+def test_another_content_under_the_same_key_is_computed_again(tmp_path, caplog):
+    files = Cache(tmp_path)
+    files.store('kind', KEY, ARRAYS)
+    with np.load(files.path('kind', KEY)) as stored:
+        arrays = dict(stored)
+    name = next(name for name in ARRAYS if ARRAYS[name].size)
+    arrays[name] = np.zeros_like(arrays[name])
+    np.savez(files.path('kind', KEY), **arrays)
+    assert files.load('kind', KEY) is None
+    assert 'holds something else' in caplog.text
+
+
+def test_a_table_of_one_user_is_readable_to_the_service_of_another(tmp_path):
+    Cache(tmp_path).store('kind', KEY, ARRAYS)
+    assert Cache(tmp_path).path('kind', KEY).stat().st_mode & 0o777 == 0o644

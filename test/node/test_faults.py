@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -17,6 +17,7 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from rotorsoil_ros.bags.metadata import files as bag_files
+from rotorsoil_ros.node.node import Survived
 
 from graphs import assert_answers, Bench, exact, joint_state, LATCHED, STAMP, stamp_ns
 
@@ -187,3 +188,26 @@ def test_nobody_who_is_told_nonsense_gives_another_number(bench, machine):
     bench.graph.until(lambda: amplitude and stamp_ns(amplitude[-1]) == STAMP + 1, 'the answer')
     bench.graph.until(lambda: len(phase) == len(amplitude), 'the phase')
     assert_answers(amplitude[-1], phase[-1], exact(machine, 300.0))
+
+
+def test_a_namesake_is_noticed_and_told_once(bench, monkeypatch, capfd):
+    node = bench.active('fan')
+    own = node.get_name(), node.get_namespace()
+    monkeypatch.setattr(node, 'get_node_names_and_namespaces', lambda: [own, ('probe', '/'), own])
+    node._look_for_namesakes()
+    assert '2 nodes are called /rotorsoil' in capfd.readouterr().err
+    node._look_for_namesakes()
+    assert '2 nodes' not in capfd.readouterr().err
+
+
+def test_what_a_callback_raises_is_told_once_and_survived():
+    told = []
+    survived = Survived(told.append)
+    for _ in range(3):
+        with survived:
+            raise KeyError('fault')
+    assert len(told) == 1
+    assert "KeyError: 'fault'" in told[0]
+    for stop in (KeyboardInterrupt, ExternalShutdownException):
+        with pytest.raises(stop), survived:
+            raise stop

@@ -29,7 +29,8 @@ def on_disk(path):
 
 
 @pytest.mark.parametrize('stop, executor', [
-    (signal.SIGINT, 'events'), (signal.SIGTERM, 'events'), (signal.SIGTERM, 'single')])
+    (signal.SIGINT, 'events'), (signal.SIGTERM, 'events'), (signal.SIGTERM, 'single'),
+    (signal.SIGHUP, 'events')])
 def test_a_signal_stops_the_node_and_its_log_is_finished(start, tmp_path, stop, executor):
     process, _ = start(f'log.directory:={tmp_path}', f'executor:={executor}')
     process.send_signal(stop)
