@@ -12,6 +12,7 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.cli import main
+from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import IMU
@@ -66,7 +67,7 @@ def messages(rows):
     return [bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]
 
 
-def restamped(target, *, change=None):
+def restamped(target, *, change=None, say=None):
     """Write the case with evenly spaced stamps, and the samples changed."""
     first, number = None, 0
     with LogFile(target) as log:
@@ -84,6 +85,8 @@ def restamped(target, *, change=None):
             rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, 10**9)
             if change is not None:
                 change(rows['linear_acceleration'])
+            if say is not None:
+                say(rows)
             log.write(Records(batch.topic, IMU, stamps.tolist(), messages(rows)))
     return target
 
@@ -118,3 +121,31 @@ def test_values_of_no_motion_are_no_verdict(fan, tmp_path, change, why):
     assert found.verdict == Verdict.UNDECIDED
     assert not [entry for entry in found.zones if entry.source == 'measured']
     assert any(f'stretches refused: {why}' in line for line in found.remarks)
+
+
+def turn(quaternion, covariance=0.0):
+    """Return what makes a sensor say that it is turned."""
+    def say(rows):
+        rows['orientation'] = quaternion
+        rows['orientation_covariance'][:, 0] = covariance
+    return say
+
+
+@pytest.mark.parametrize('quaternion, covariance, is_kept', [
+    ((0.0, 0.0, 0.0, 0.0), 0.0, True), ((0.0, 0.0, 0.0, 1.0), 0.0, True),
+    ((0.0, 0.0, 0.0, -1.0), 0.0, True), ((0.0, 0.0, 0.0393, 0.9992), 0.0, True),  # 4.5 degrees
+    ((0.0, 0.0, 0.7071, 0.7071), -1.0, True), ((0.0, 0.0, 0.7071, 0.7071), 0.0, False),
+    ((0.0523, 0.0, 0.0, 0.9986), 0.01, False)])  # 6 degrees
+def test_sensor_that_says_it_is_turned_is_refused(fan, tmp_path, quaternion, covariance, is_kept):
+    log = restamped(tmp_path / 'log.mcap', say=turn(quaternion, covariance))
+    found = compare(log, FAN, cache_directory=fan.directory)
+    refused = [line for line in found.remarks if 'the orientation of the sensor turns' in line]
+    assert bool(refused) != is_kept
+    assert (found.verdict == Verdict.PASSES) == is_kept
+    if not is_kept:
+        assert ('by 90 deg' if quaternion[3] < 0.8 else 'by 6 deg') in refused[0]
+
+
+def test_filter_that_the_case_states_reaches_the_judge(fan):
+    assert not Judging.of(fan.case).has_filter
+    assert Judging.of(fan.case.changed(['anti_alias=true'])).has_filter

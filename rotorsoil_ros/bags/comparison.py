@@ -123,7 +123,8 @@ class _Reading:
         collector, unbalances = Collector(), [(0, expectation.case.unbalance)]
         monitor = Monitor(
             machine, expectation.table, expectation.case.unbalance, sinks=[collector],
-            judging=Judging(rules, self.wish.turns), hindsight=hindsight)
+            judging=Judging(rules, self.wish.turns, has_filter=expectation.case.anti_alias),
+            hindsight=hindsight)
         monitor.judge.take_criteria(expectation.criteria(expectation.case.unbalance))
 
         def take(stamp_ns: int, description: Mapping[str, Any]) -> None:

@@ -61,6 +61,8 @@ class Case:
         How far the soil may be from what the file says.
     zones : ZoneLimits
         Of housing velocity.
+    anti_alias : bool
+        Whether a filter before each sensor's converter lets nothing above half its rate pass.
     content : mapping
         The document that it was built from, settings on top included.
     files : mapping of str to str
@@ -80,6 +82,7 @@ class Case:
     tables: tuple[ComplianceTable, ...] = ()
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
+    anti_alias: bool = False
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
@@ -207,7 +210,8 @@ class _Builder:
             name=entries.name, path=faults.path, soil=soil, support=entries.support,
             foundations=foundations, rotor=rotor, unbalance=unbalance,
             couples=unbalances.couples(), speed_range=speed_range, tables=tables,
-            uncertainty=uncertainty, zones=zones, content=self.content, files=self.files)
+            uncertainty=uncertainty, zones=zones, anti_alias=self.faults.entries.anti_alias,
+            content=self.content, files=self.files)
         with faults.at('rotor', entry=entries.rotor):
             self._refuse_size(CoupledModel(
                 rotor, case.foundations, [RigidSoil() for _ in case.foundations], case.couples))

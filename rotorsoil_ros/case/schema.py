@@ -324,6 +324,7 @@ class Document(Entry):
     speed_range_rpm: tuple[Rpm, Rpm]
     uncertainty: Uncertainty | None = None
     zones: ZonesEntry | None = None
+    anti_alias: bool = False
 
 
 _WHAT = {

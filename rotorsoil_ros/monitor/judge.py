@@ -125,7 +125,8 @@ class Judge:
         known = self._demodulators.get(samples.channel)
         if known is None:
             known = self._demodulators[samples.channel] = Demodulator(
-                self.machine, samples.channel, self.history, turns=self._judging.turns)
+                self.machine, samples.channel, self.history, turns=self._judging.turns,
+                has_filter=self._judging.has_filter)
         known.take(samples)
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> Iterator[Event]:

@@ -85,14 +85,18 @@ class Judging:
         Turns of the rotor that make one vector of raw samples.
     band_period_s : float
         Message time between two bands while the speed changes; 0: one with every speed [s].
+    has_filter : bool
+        Whether a filter before each sensor's converter lets nothing above half its rate pass.
 
     """
 
     rules: Rules = field(default_factory=Rules)
     turns: float = 10.0
     band_period_s: float = 0.1
+    has_filter: bool = False
 
     @classmethod
     def of(cls, case: Case, *, matching: Matching | None = None, **other: float) -> 'Judging':
         """Return how a case is judged."""
-        return cls(Rules(matching=matching or Matching(), zones=case.zones), **other)
+        return cls(Rules(matching=matching or Matching(), zones=case.zones),
+                   has_filter=case.anti_alias, **other)

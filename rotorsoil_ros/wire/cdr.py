@@ -290,11 +290,16 @@ class JointStates:
 
 @dataclass(frozen=True, slots=True)
 class Accelerations:
-    """Stamps (n,) [ns] and accelerations (n, 3) [m/s^2], NaN where the sensor has none."""
+    """
+    Stamps (n,) [ns] and accelerations (n, 3) [m/s^2], NaN where the sensor has none.
+
+    `turned` is the angle (n,) by which its orientation turns the axes [rad], 0 if it has none.
+    """
 
     stamp_ns: IntArray
     acceleration: FloatArray
     is_synthetic: bool
+    turned: FloatArray
 
 
 Decoded = TypeVar('Decoded', bound=JointStates | Accelerations)
@@ -353,7 +358,20 @@ def accelerations(layout: Layout, cdrs: Sequence[bytes]) -> Accelerations:
     acceleration[rows['linear_acceleration_covariance'][:, 0] == NOT_MEASURED] = np.nan
     acceleration[np.abs(acceleration) > LARGEST_ACCELERATION] = np.nan
     return Accelerations(_stamps(rows), acceleration,
-                         layout.texts['header.frame_id'][0].startswith(SYNTHETIC))
+                         layout.texts['header.frame_id'][0].startswith(SYNTHETIC),
+                         _turned(rows))
+
+
+def _turned(rows: np.ndarray) -> FloatArray:
+    """Return the angles (n,) by which orientations turn [rad], 0 where none is told."""
+    quaternion = rows['orientation'].astype(float)
+    size = np.sqrt(np.sum(quaternion**2, axis=1))
+    is_told = (np.isfinite(size) & (size > 0.0)
+               & (rows['orientation_covariance'][:, 0] != NOT_MEASURED))
+    # The whole angle from both parts: of a small one the cosine alone has no digits.
+    angle = 2.0 * np.arctan2(np.linalg.norm(quaternion[:, :3], axis=1),
+                             np.abs(quaternion[:, 3]))
+    return np.where(is_told, angle, 0.0)
 
 
 def _stamps(rows: np.ndarray) -> IntArray:

@@ -296,7 +296,8 @@ def _tell_samples(
     """Tell raw samples of one channel."""
     monitor.on_samples(Samples(
         monitor.machine, channel, stamp_ns,
-        samples.acceleration[rows, AXES.index(channel.axis)], samples.is_synthetic))
+        samples.acceleration[rows, AXES.index(channel.axis)], samples.is_synthetic,
+        samples.turned[rows]))
 
 
 def are_stamps(stamp_ns: IntArray) -> bool:

@@ -114,8 +114,9 @@ class Finding:
         if self._turn_rate > _TOLD_BELOW * rate:
             return Refusal(Flaw.NYQUIST, f'1X is above {_TOLD_BELOW:g} of the sample rate')
         if (other := self._image(1, rate)) is not None:
-            return Refusal(Flaw.ALIAS, f'1X cannot be told from {other}X at this rate: sample at '
-                           f'{_HIGHEST_IMAGE + 1} times the speed or more, or state the filter')
+            return Refusal(
+                Flaw.ALIAS, f'1X cannot be told from {other}X at this rate: sample at '
+                f'{_HIGHEST_IMAGE + 1} times the speed or more, or state anti_alias in the case')
         return None
 
     def _image(self, order: int, rate: float) -> int | None:
