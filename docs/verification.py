@@ -26,9 +26,9 @@ sys.path.extend(str(Path(__file__).resolve().parents[1] / folder) for folder in 
     '.', 'test'))
 
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.document import text_of
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.case.ross import read
-from rotorsoil_ros.case.writer import text_of
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, RigidSoil, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
