@@ -42,7 +42,7 @@ def test_demo_leaves_log_recording_and_pictures(tmp_path, monkeypatch, capfd):
     said = capfd.readouterr().out
     assert '120 speeds sent over DDS, 120 answered and logged' in said
     assert {path.name for path in (tmp_path / 'run').iterdir()} == {
-        'metadata.yaml', 'run_0.mcap', 'run.rrd'}
+        '.rotorsoil_log', 'metadata.yaml', 'run_0.mcap', 'run.rrd'}
     assert (tmp_path / 'plots' / 'demo.png').stat().st_size > 10_000
     assert 'um at' in said
 

@@ -13,8 +13,6 @@ import sys
 import time
 
 import numpy as np
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.bags import reader as bag_reader
@@ -30,6 +28,7 @@ from rotorsoil_ros.figures.response import all_figures, trend
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
+from rotorsoil_ros.wire.cdr import JointStateReader
 
 MACHINE = 'paper_rotor'
 
@@ -133,16 +132,19 @@ def _read(log: Path) -> _Answers:
     stamps: list[int] = []
     rows: list[FloatArray] = []
     channels: tuple[Channel, ...] = ()
-    wanted = {f'/{MACHINE}/joint_states', f'/rotorsoil/{MACHINE}/amplitude'}
-    for source, _, payload in bag_reader.messages(log, lambda topic, _: topic in wanted):
-        message = deserialize_message(bytes(payload), JointState)
-        stamp_ns = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
-        if source.topic.endswith('/joint_states'):
-            speeds[stamp_ns] = message.velocity[0]
-        else:
-            channels = tuple(map(Channel.parse, message.name))
-            stamps.append(stamp_ns)
-            rows.append(np.array(message.position))
+    told, answered = f'/{MACHINE}/joint_states', f'/rotorsoil/{MACHINE}/amplitude'
+    readers = {told: JointStateReader(), answered: JointStateReader()}
+    for source, _, payload in bag_reader.messages(log, lambda topic, _: topic in readers):
+        for _, states in readers[source.topic].runs([bytes(payload)]):
+            if states is None:
+                continue
+            stamp_ns = int(states.stamp_ns[0])
+            if source.topic == told:
+                speeds[stamp_ns] = float(states.velocity[0, 0])
+            else:
+                channels = tuple(map(Channel.parse, states.names))
+                stamps.append(stamp_ns)
+                rows.append(states.position[0])
     return _Answers(np.array(stamps), np.array([speeds[stamp] for stamp in stamps]), channels,
                     np.array(rows))
 

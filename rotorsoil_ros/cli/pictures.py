@@ -6,8 +6,8 @@ from importlib.resources import as_file, files
 from itertools import chain
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
 import numpy as np
 
 from rotorsoil_ros.case import cache, models
@@ -22,6 +22,9 @@ from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigur
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.figures import Figure
 
 
 def plot(arguments: Namespace) -> int:
@@ -40,7 +43,7 @@ def plot(arguments: Namespace) -> int:
     return 0
 
 
-def _modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, Figure]]:
+def _modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, 'Figure']]:
     """Yield the pictures of the modes, or say why there are none."""
     try:
         yield from modal_figures(case, model)
@@ -51,7 +54,7 @@ def _modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, Figur
 
 def _studies(
     case: Case, model: CoupledModel, table: ResponseTable,
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, 'Figure']]:
     predictor = table.predictor(case.unbalance)
     if case.rotor.discs and np.any(case.unbalance):
         yield 'polar', polar(case, predictor, main_peaks(case, predictor))
@@ -61,7 +64,7 @@ def _studies(
 
 def _soil_figures(
     case: Case, model: CoupledModel, directory: Path,
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, 'Figure']]:
     """Yield both models of the soil below each block, where the case has a soil."""
     if case.soil is None or case.support.model not in ('cone', 'infinite_elements'):
         return

@@ -24,6 +24,7 @@ ZONE_COLOURS = {'A/B': '#009e73', 'B/C': '#e69f00', 'C/D': '#c0392b'}
 _MICRO = 1e6
 _MILLI = 1e3
 _MOST_LINES = 6
+_LONGEST_LABEL = 48
 
 
 def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
@@ -37,6 +38,12 @@ def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
     if comparison.points:  # everything measured may have been refused
         yield 'trend', 'Trend', trend(comparison)
         yield 'residuals', 'Measured less predicted vectors', residuals(comparison)
+
+
+def _label(points: ChannelPoints) -> str:
+    """Return the name of a channel, cut where a stranger's would fill the picture."""
+    name = str(points.channel)
+    return name if len(name) <= _LONGEST_LABEL else f'{name[:_LONGEST_LABEL]}...'
 
 
 def _unit(channel: Channel) -> str:
@@ -72,7 +79,7 @@ def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
     for axes in (amplitude, phase):
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize=8)
-    figure.suptitle(f'{comparison.run.title}: {points.channel}, 1X', fontsize=10)
+    figure.suptitle(f'{comparison.run.title}: {_label(points)}, 1X', fontsize=10)
     return figure
 
 
@@ -153,7 +160,7 @@ def polar(points: ChannelPoints, title: str) -> Figure:
     axes.set_ylim(0.0, largest)
     axes.tick_params(labelsize=7)
     axes.legend(fontsize=7, loc='upper left', bbox_to_anchor=(1.02, 1.0))
-    axes.set_title(f'{title}: {points.channel}, 1X [{_unit(points.channel)}, zero-to-peak]',
+    axes.set_title(f'{title}: {_label(points)}, 1X [{_unit(points.channel)}, zero-to-peak]',
                    fontsize=9)
     return figure
 
@@ -174,10 +181,10 @@ def trend(comparison: Comparison) -> Figure:
                  else np.full(len(time), _MICRO))
         colour = COLOURS[number % len(COLOURS)]
         bottom.plot(time, scale * points.amplitude, '.', color=colour, markersize=3.5,
-                    label=f'{points.channel} measured')
+                    label=f'{_label(points)} measured')
         order = np.argsort(time, kind='stable')
         bottom.plot(time[order], (scale * np.abs(points.predicted))[order], color=colour,
-                    linewidth=1.0, label=f'{points.channel} predicted')
+                    linewidth=1.0, label=f'{_label(points)} predicted')
     if housings:
         _draw_zones(bottom, comparison)
     bottom.set_yscale('log')
@@ -218,7 +225,7 @@ def residuals(comparison: Comparison) -> Figure:
         size.plot(rad_s_to_rpm(points.speed[~used]), left[~used], 'x', color=LEFT_OUT,
                   markersize=3)
         size.plot(rad_s_to_rpm(points.speed[used]), left[used], '.', color=colour, markersize=4,
-                  label=points.channel)
+                  label=_label(points))
         plane.plot(vector[used].real, vector[used].imag, '.', color=colour, markersize=4)
     size.set_yscale('log')
     size.set(xlabel='speed [rpm]', ylabel='|measured - predicted| [um]')

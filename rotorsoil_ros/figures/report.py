@@ -8,6 +8,7 @@ import io
 import json
 import math
 from pathlib import Path
+import re
 
 import numpy as np
 
@@ -39,6 +40,7 @@ figcaption { font-size: 12px; color: #555; }
 """
 
 _DPI = 110
+_LONGEST_NAME = 100
 ZONES = ('A', 'B', 'C', 'D')
 
 _WORDS = {
@@ -73,15 +75,21 @@ def write_report(
     content = {**document(comparison), 'log': source, 'identification': list(identification)}
     (out / 'comparison.json').write_text(
         json.dumps(content, indent=1, allow_nan=False) + '\n', encoding='utf-8')
-    pictures = []
+    pictures: list[tuple[str, bytes]] = []
     for name, caption, figure in all_figures(comparison):
         stream_of = io.BytesIO()
         figure.savefig(stream_of, dpi=_DPI, format='png')
-        (out / f'{name}.png').write_bytes(stream_of.getvalue())
+        (out / f'{_file_name(name, len(pictures))}.png').write_bytes(stream_of.getvalue())
         pictures.append((caption, stream_of.getvalue()))
     (out / 'report.html').write_text(
         page(comparison, pictures, source=source, identification=identification),
         encoding='utf-8')
+
+
+def _file_name(name: str, number: int) -> str:
+    """Return a name as a file may have it: what a log calls a channel is no path."""
+    plain = re.sub(r'[^A-Za-z0-9_-]', '_', name)[:_LONGEST_NAME]
+    return plain if plain == name else f'{plain}_{number}'
 
 
 def page(

@@ -14,6 +14,7 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Compared, Remark, Weighed
+from rotorsoil_ros.figures.report import write_report
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.points import Collector
@@ -260,3 +261,13 @@ def test_the_face_compares_with_whatever_names_the_machine(fan, answered):
     given = [rs.compare(str(answered)), rs.compare(answered, fan), rs.compare(answered, str(FAN))]
     assert {found.verdict for found in given} == {rs.Verdict.FAILS}
     assert given[0].failures == given[1].failures == given[2].failures
+
+
+@pytest.mark.parametrize('channel', ['DE/X', '../../outside', 'x' * 300])
+def test_what_a_log_calls_a_channel_never_becomes_a_path(fan, tmp_path, channel):
+    log = write(tmp_path / 'log.mcap', np.full(20, 100.0), np.full(20, 1e-5), channel=channel)
+    out = tmp_path / 'out'
+    out.mkdir()
+    write_report(compare(log, fan), out, source='log')
+    assert {path.parent for path in tmp_path.rglob('*.png')} == {out}
+    assert (out / 'report.html').exists()
