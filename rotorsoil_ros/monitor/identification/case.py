@@ -205,8 +205,8 @@ def identify_vectors(
     plain = Problem(respond.asked_only, run.measured, run.stretch,
                     np.array([scalar.spread for scalar in asked]), len(asked), np.zeros(0),
                     wanted.gain, wanted.angle)
-    _refuse_blind(plain, columns)
     start = _best_start(plain)
+    _refuse_blind(plain, start, columns)
     slip = _slip(plain, run)
     described = solve(plain, start)
     _refuse_unexplained(described, asked, slip)
@@ -330,10 +330,10 @@ def _rebuilt(case: Case, nominal: CoupledModel) -> CoupledModel:
     return replace(nominal, rotor=case.rotor, foundations=case.foundations, soil_models=soils)
 
 
-def _refuse_blind(problem: Problem, columns: Sequence[str]) -> None:
-    """Refuse what the sensors cannot tell apart."""
+def _refuse_blind(problem: Problem, logs: FloatArray, columns: Sequence[str]) -> None:
+    """Refuse what the sensors cannot tell apart where the search begins."""
     given, weight = problem.given, problem.weight
-    system = (problem.respond(np.zeros(len(problem.spread))) * weight[:, None])[given]
+    system = (problem.respond(logs) * weight[:, None])[given]
     if len(system) <= system.shape[1]:
         raise NotSolvedError(f'{len(columns)} unbalances need more than as many vectors, got '
                              f'{len(system)}')

@@ -34,14 +34,14 @@ def describe(found: Identification) -> Iterator[str]:
     if found.slip:
         yield f'  {found.slip}'
     wider = widening(found.tolerant)
-    off = ', '.join(scalar.path.rpartition('.')[2] for scalar in found.tolerances) or 'nothing'
+    off = ', '.join(scalar.path.rpartition('.')[2] for scalar in found.tolerances) or 'all else'
     for index, scalar in enumerate(found.scalars):
         yield (f'  {scalar.path}: factor {found.factor[index]:.4g} +- '
                f'{_percent(found.described, index)} for this case exactly as described')
         factor = math.exp(found.tolerant.state.logs[index])
         yield (f'  {scalar.path}: factor {factor:.3g} +- '
-               f'{_percent(found.tolerant, index, wider)} if {off} are within their '
-               'tolerances: quote this one')
+               f'{_percent(found.tolerant, index, wider)} within tolerances of {off}: '
+               'quote this one')
     for index, column in enumerate(found.columns):
         yield from _column(found, index, column, wider)
     yield from _alarms(found, wider)
@@ -121,7 +121,8 @@ def _trades(found: Identification) -> Iterator[str]:
         for column in range(row + 1, len(names)):
             if abs(correlation[row, column]) > _TRADES:
                 yield (f'  {names[row]} and {names[column]} trade off (correlation '
-                       f'{correlation[row, column]:+.3f}): mostly their ratio is told')
+                       f'{correlation[row, column]:+.3f}): mostly their '
+                       f'{"ratio" if correlation[row, column] > 0.0 else "product"} is told')
 
 
 def write_case(found: Identification, target: Path) -> None:
