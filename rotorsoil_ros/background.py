@@ -11,7 +11,7 @@ import sys
 import threading
 from typing import Generic, TypeVar
 
-from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.errors import BAD_INPUT, RotorSoilError
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')
@@ -20,7 +20,6 @@ BACKLOG = 10  # batches, one each second; what a stuck viewer does not take is d
 PATIENCE_S = 2.0  # at the end
 GLANCE_S = 0.002  # at a child whose pipe has to be emptied
 NICE = 10  # how far a child stands back behind answers
-BAD_INPUT = 2  # status of a child that has said in one line what is wrong
 
 
 class Aside(Generic[Item]):

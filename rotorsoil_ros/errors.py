@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+BAD_INPUT = 2  # exit status
+
 
 class RotorSoilError(ValueError):
     """Anything that this package refuses to do."""

@@ -33,21 +33,13 @@ OWNERS = {
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},
 }
 LONGEST_ROOM, SHORTEST_ROOM = 400, 60
+MOST_ROOMS = 16
 
-# Where the move into this house is not done yet; each entry goes with its mend.
-UNDER_WAY = {
-    'twice',
-}
 
 
 def name_of(path):
     return '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__')
 
-
-def finished(names):
-    return [name for name in names if name_of(name) not in UNDER_WAY]
-
-MOST_ROOMS = 16
 
 def imported_by(path):
     """Return every module that a file names in an import."""
@@ -82,21 +74,21 @@ def named_in(path):
 
 
 @pytest.mark.parametrize(
-    'path', [path for path in finished(ROOMS) if name_of(path) != FACE], ids=name_of)
+    'path', [path for path in ROOMS if name_of(path) != FACE], ids=name_of)
 def test_room_takes_from_below_only(path):
     allowed = below(wing_of(name_of(path)))
     ours = [name for name in named_in(path) if name.split('.')[0] == 'rotorsoil_ros']
     assert [name for name in ours if wing_of(name) not in allowed] == []
 
 
-@pytest.mark.parametrize('path', finished(ROOMS), ids=name_of)
+@pytest.mark.parametrize('path', ROOMS, ids=name_of)
 def test_library_is_imported_in_its_wing_only(path):
     wing = wing_of(name_of(path))
     assert [name for name in imported_by(path)
             if wing not in OWNERS.get(name.split('.')[0], {wing})] == []
 
 
-@pytest.mark.parametrize('wing', sorted(DAG.keys() - UNDER_WAY))
+@pytest.mark.parametrize('wing', sorted(DAG))
 def test_wing_imports_without_what_is_above_it(wing):
     if wing == 'screen':
         pytest.importorskip('rerun', reason='rerun-sdk is optional')
@@ -121,7 +113,7 @@ def test_no_wing_is_crowded_and_none_is_missing():
         firsts = Counter(name.split('_')[0] for name in names)
         if len(names) > MOST_ROOMS or max(firsts.values(), default=0) > 2:
             crowded[folder.name] = len(names), firsts.most_common(1)
-    assert crowded.keys() - UNDER_WAY == set()
+    assert crowded == {}
 
 
 def test_no_class_or_constant_is_defined_twice():
@@ -135,11 +127,11 @@ def test_no_class_or_constant_is_defined_twice():
                 if name[0] != '_' and (isinstance(node, ast.ClassDef) or name.isupper()):
                     where[name].append(name_of(path))
     twice = {name: rooms for name, rooms in where.items() if len(rooms) > 1}
-    assert 'twice' in UNDER_WAY or twice == {}
+    assert twice == {}
 
 
 @pytest.mark.parametrize('path', [
-    path for path in finished(ROOMS) if wing_of(name_of(path)) not in (BASE, 'cli')
+    path for path in ROOMS if wing_of(name_of(path)) not in (BASE, 'cli')
     and path.name != '__init__.py'], ids=name_of)
 def test_room_is_worth_its_door(path):
     assert len(path.read_text().splitlines()) >= SHORTEST_ROOM

@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.profile import BATCH, inputs as inputs_among, is_input, near_misses, Place
+from rotorsoil_ros.bags.profile import (
+    inputs as inputs_among,
+    is_input,
+    near_misses,
+    Place,
+    SPEEDS_AT_ONCE,
+)
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.monitor.monitor import Monitor
@@ -142,7 +148,8 @@ def feed(
         for topic, (where, _) in inputs.topics.items()}
     models = inputs.models if on_description is not None else ()
     # Where more is told than speeds, what belongs together has to come together.
-    at_most, span_ns = (AT_ONCE, NANOSECONDS) if inputs.is_measured else (BATCH, LAST_STAMP)
+    at_most, span_ns = (
+        (AT_ONCE, NANOSECONDS) if inputs.is_measured else (SPEEDS_AT_ONCE, LAST_STAMP))
     second = now_ns = None
     for batch in bag_reader.batches(
             inputs.bag, lambda topic, kind: (

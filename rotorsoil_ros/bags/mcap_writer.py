@@ -36,14 +36,14 @@ from rotorsoil_ros.arrays import IntArray
 
 CHUNK_SIZE = 1 << 20
 ZSTD_LEVEL = 1  # twice as fast as 3, and float64 noise does not get smaller
-MESSAGE_HEADER = np.dtype([
+MESSAGE_RECORD = np.dtype([
     ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
     ('log_time', '<u8'), ('publish_time', '<u8')])
-HEADER_SIZE = MESSAGE_HEADER.itemsize
+HEADER_SIZE = MESSAGE_RECORD.itemsize
 UNCOUNTED = 9  # opcode and length of a record do not count in its length
 INDEX_HEADER = struct.Struct('<BQHI')
 FOOTER_BODY = struct.Struct('<BQQQ')
-LAST_STAMP = (1 << 64) - 1
+LARGEST_STAMP = (1 << 64) - 1
 
 
 @dataclass(slots=True)
@@ -77,7 +77,7 @@ class Messages:
         """
         count, front = len(self.payloads), b''.join(self.front)
         length = np.fromiter(map(len, self.payloads), dtype=np.int64, count=count)
-        headers = np.empty(count, dtype=MESSAGE_HEADER)
+        headers = np.empty(count, dtype=MESSAGE_RECORD)
         headers['opcode'], headers['channel'] = Opcode.MESSAGE, self.channels
         headers['length'] = length + (HEADER_SIZE - UNCOUNTED)
         headers['log_time'] = headers['publish_time'] = self.stamp_ns
@@ -105,7 +105,7 @@ class McapWriter:
     def __init__(self, stream: BinaryIO, *, profile: str, library: str) -> None:
         self.size = self.index_size = 0  # bytes
         self.counts: dict[int, int] = defaultdict(int)
-        self.start_ns, self.end_ns = LAST_STAMP, 0
+        self.start_ns, self.end_ns = LARGEST_STAMP, 0
         self.longest_ns = 0
         self._first_ns: dict[int, int] = {}
         self._spanning: set[int] = set()

@@ -47,7 +47,7 @@ class FileEntry:
 
 
 @dataclass(frozen=True, slots=True)
-class Contents:
+class BagContents:
     """What a bag holds: its files in their order, its topics, and messages by topic."""
 
     files: Sequence[FileEntry]
@@ -162,7 +162,7 @@ def _profiles(text: str) -> list[dict[str, Any]]:
     return said if isinstance(said, list) else []
 
 
-def write(directory: Path, contents: Contents, gaps: Mapping[str, str]) -> None:
+def write(directory: Path, contents: BagContents, gaps: Mapping[str, str]) -> None:
     """
     Write `metadata.yaml`: whoever reads it meanwhile sees the old one or the new one.
 
@@ -170,7 +170,7 @@ def write(directory: Path, contents: Contents, gaps: Mapping[str, str]) -> None:
     ----------
     directory : Path
         Of the bag.
-    contents : Contents
+    contents : BagContents
         What it holds.
     gaps : mapping of str
         What it does not hold although it should, and why.
@@ -187,7 +187,7 @@ def write(directory: Path, contents: Contents, gaps: Mapping[str, str]) -> None:
         raise
 
 
-def information(contents: Contents, gaps: Mapping[str, str]) -> dict[str, Any]:
+def information(contents: BagContents, gaps: Mapping[str, str]) -> dict[str, Any]:
     """Return what `metadata.yaml` says of a bag."""
     files = contents.files
     filled = [file for file in files if file.count]

@@ -20,7 +20,7 @@ from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import raw_channel, ROTOR_JOINT, SPEED_TOPICS, SpeedReader, TOPICS
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
-BATCH = 1024
+SPEEDS_AT_ONCE = 1024
 IMU_NAME = 'measured/<channel>/imu'
 MICROMETRE = 1e-6
 
@@ -108,7 +108,7 @@ def speed_profile(path: Path, *, rotor_joint: str = ROTOR_JOINT) -> Iterator[Spe
     A JointState counts at its own stamp, a Float64 at its time of reception.
     """
     readers: dict[str, SpeedReader] = {}
-    for batch in bag_reader.batches(path, tells_speed, at_most=BATCH):
+    for batch in bag_reader.batches(path, tells_speed, at_most=SPEEDS_AT_ONCE):
         if batch.topic not in readers:
             readers[batch.topic] = SpeedReader(
                 batch.type, rotor_joint=rotor_joint, note=lambda reason, count: None)
@@ -159,8 +159,8 @@ def write_speed_profile(
 ) -> None:
     """Write speeds (n,) [rad/s] at stamps (n,) [ns] as an MCAP file for replay or predict."""
     with LogFile(path) as log:
-        for start in range(0, len(speed), BATCH):
-            part = slice(start, start + BATCH)
+        for start in range(0, len(speed), SPEEDS_AT_ONCE):
+            part = slice(start, start + SPEEDS_AT_ONCE)
             log.write(_joint_states(f'/{machine}/joint_states', ROTOR_JOINT, stamp_ns[part],
                                     velocity=speed[part]))
 

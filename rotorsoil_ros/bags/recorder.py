@@ -204,9 +204,9 @@ def reserve(directory: Path) -> None:
         probe.unlink(missing_ok=True)
 
 
-BATCH = 64  # records: more would keep the thread, and so the interpreter, busy for too long
-BACKLOG = 2048  # batches that wait for a disk that hangs: 100 MB, or half an hour at 10 Hz
-PATIENCE_S = 5.0  # at the end
+ITEMS_AT_ONCE = 64  # records: more would keep the thread, and the interpreter, busy too long
+LOG_BACKLOG = 2048  # batches that wait for a disk that hangs: 100 MB, or half an hour at 10 Hz
+LOG_PATIENCE_S = 5.0  # at the end
 BEHIND = 'the disk did not keep up'
 
 
@@ -235,7 +235,7 @@ class BagAside:
         self._missed: Missed | None = None
         self._said = recorder.report(0)
         self._aside = Aside(self._take, recorder.close, complain=complain, name='the log',
-                            done='logged', backlog=BACKLOG, patience_s=PATIENCE_S)
+                            done='logged', backlog=LOG_BACKLOG, patience_s=LOG_PATIENCE_S)
 
     @property
     def path(self) -> Path | None:
@@ -255,7 +255,7 @@ class BagAside:
     def write(self, records: Records) -> None:
         """Log messages of one topic."""
         self._waiting.append(records)
-        if len(self._waiting) >= BATCH:
+        if len(self._waiting) >= ITEMS_AT_ONCE:
             self._hand_over()
 
     def flush(self, *, wait_s: float = 0.0) -> None:

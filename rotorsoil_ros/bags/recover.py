@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, MCAP0_MAGIC, Writer
 
 from rotorsoil_ros.background import run_as_child
 from rotorsoil_ros.bags import metadata as bag_metadata
-from rotorsoil_ros.bags.metadata import beside, Contents, FileEntry, files_in, Topic
+from rotorsoil_ros.bags.metadata import BagContents, beside, FileEntry, files_in, Topic
 from rotorsoil_ros.bags.reader import (
     BROKEN,
     inside,
@@ -151,7 +151,7 @@ def describe(bag: Path, files: Sequence[Path], gaps: Mapping[str, str]) -> None:
         entries.append(entry)
         topics |= own
         counts.append(count)
-    bag_metadata.write(bag, Contents(entries, topics, bag_metadata.total(counts)), gaps)
+    bag_metadata.write(bag, BagContents(entries, topics, bag_metadata.total(counts)), gaps)
 
 
 def _summary(file: Path) -> tuple[FileEntry, dict[str, Topic], dict[str, int]]:

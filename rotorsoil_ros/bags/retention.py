@@ -15,7 +15,7 @@ from rotorsoil_ros.bags import metadata as bag_metadata
 from rotorsoil_ros.bags.metadata import RECOVERED
 
 MARKER = '.rotorsoil_log'
-OPENING = 64  # bytes in which a file says who wrote it
+OPENING_BYTES = 64  # bytes in which a file says who wrote it
 
 Tell = Callable[[str], object]
 
@@ -97,7 +97,7 @@ def own_bags(directory: Path, name: str) -> list[Path]:
 def is_own(file: Path) -> bool:
     """Return whether an MCAP file was written by this package."""
     with suppress(OSError), file.open('rb') as stream:
-        opening = stream.read(OPENING)
+        opening = stream.read(OPENING_BYTES)
         return (opening.startswith(MCAP0_MAGIC) and opening[8:9] == bytes([Opcode.HEADER])
                 and bag_metadata.WRITER.encode() in opening)
     return False

@@ -11,7 +11,7 @@ from types import TracebackType
 import rotorsoil_ros
 from rotorsoil_ros.bags import metadata as bag_metadata
 from rotorsoil_ros.bags.mcap_writer import McapWriter
-from rotorsoil_ros.bags.metadata import Contents, FileEntry, offered_qos_text, Topic
+from rotorsoil_ros.bags.metadata import BagContents, FileEntry, offered_qos_text, Topic
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.wire.definitions import definition, type_hash
 from rotorsoil_ros.wire.messages import Records
@@ -260,7 +260,7 @@ class BagWriter:
         if not self._is_closed:
             files = [*files, self._file.entry]
             topics, counts = topics | self._file.topics, counts + self._file.counts
-        bag_metadata.write(self.path, Contents(files, topics, counts), self.gaps)
+        bag_metadata.write(self.path, BagContents(files, topics, counts), self.gaps)
 
 
 def last_of(records: Records) -> Records:

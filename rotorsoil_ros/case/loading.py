@@ -12,7 +12,7 @@ from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.half_space import a0_range
 
-GLANCE_S = 0.05
+TABLE_GLANCE_S = 0.05
 SHARES = 4  # for each core: to start a process takes longer than one more table on known soil
 
 Tell = Callable[[str], object]
@@ -96,7 +96,7 @@ def tabulate(files: Sequence[Path], directory: Path, *, tell: Tell) -> None:
             Child, __name__, [str(directory), *map(str, cases)]), partial(finish, cases))
     try:
         while not children.are_done:
-            children.step(wait_s=GLANCE_S)
+            children.step(wait_s=TABLE_GLANCE_S)
     finally:
         children.close()
 

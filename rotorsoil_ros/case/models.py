@@ -10,7 +10,7 @@ from rotorsoil_ros.errors import InputError, RotorSoilError, solved
 from rotorsoil_ros.ground.accuracy import mapping_error
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import DimensionlessTable, require_kind
-from rotorsoil_ros.ground.half_space import a0_range, ALGORITHM, InfiniteElementModel
+from rotorsoil_ros.ground.half_space import a0_range, ELEMENTS_ALGORITHM, InfiniteElementModel
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
@@ -101,8 +101,8 @@ def infinite_element_model(
 
 def compliance_key(soil: Soil, geometry: str, a0_min: float, a0_max: float) -> str:
     """Return what identifies a dimensionless table: neither G, nor density, nor size."""
-    return content_key('compliance', ALGORITHM, geometry, soil.poisson_ratio, soil.loss_factor,
-                       a0_min, a0_max)
+    return content_key('compliance', ELEMENTS_ALGORITHM, geometry, soil.poisson_ratio,
+                       soil.loss_factor, a0_min, a0_max)
 
 
 def response_key(case: Case, model: CoupledModel) -> str:

@@ -10,9 +10,8 @@ import sys
 import warnings
 
 from rotorsoil_ros.cli.parser import parse
-from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.errors import BAD_INPUT, InputError, RotorSoilError
 
-BAD_INPUT = 2
 INTERRUPTED = 130
 
 

@@ -19,7 +19,7 @@ from rotorsoil_ros.monitor.identification.words import describe
 from rotorsoil_ros.screen import recorder
 
 CASE, PLANE, SOIL = 'plant_fan', 'wheel', 'soil.shear_modulus'
-SYNTHETIC = f'synthetic_{CASE}'  # its name in every topic and on the screen
+SYNTHETIC_FAN = f'synthetic_{CASE}'  # its name in every topic and on the screen
 
 # Softer ground than the case has, and in a time lapse a wheel on which dust settles.
 _TRUTH = Truth(shear_modulus_factor=0.7, growth=6.0, noise=0.05, ramp_s=20.0, dwell_s=6.0,
@@ -40,12 +40,12 @@ def demonstrate_comparison(out: Path, directory: Path, *, start_ns: int) -> None
 
     """
     out.mkdir(exist_ok=True)
-    signals, log = out / 'signals.mcap', out / f'{SYNTHETIC}.mcap'
-    recording = out / f'{SYNTHETIC}.rrd' if find_spec('rerun') else None
+    signals, log = out / 'signals.mcap', out / f'{SYNTHETIC_FAN}.mcap'
+    recording = out / f'{SYNTHETIC_FAN}.rrd' if find_spec('rerun') else None
     with as_file(files('rotorsoil_ros') / 'config' / f'{CASE}.yaml') as path:
         with progress('integrating the equations of motion') as _:
             machine = Machine.load(path, cache_directory=directory)
-            write_synthetic(signals, SYNTHETIC, machine.model, machine.case.unbalance,
+            write_synthetic(signals, SYNTHETIC_FAN, machine.model, machine.case.unbalance,
                             truth=_TRUTH, start_ns=start_ns)
         with progress('answering') as report:
             predict(machine, signals, log, progress=report,
@@ -85,7 +85,7 @@ def _print(found: Identification, comparison: Comparison, *, start_ns: int) -> N
     first, last = put_in(comparison, given, start_ns=start_ns)
     start, growth = (complex(found.moment[found.columns.index(name)])
                      for name in (PLANE, f'growth of {PLANE}'))
-    print(f'{CASE}: SYNTHETIC sensors of {comparison.run.time[-1]:.0f} s, '
+    print(f'{CASE}: SYNTHETIC_FAN sensors of {comparison.run.time[-1]:.0f} s, '
           'compared with the case')
     print(f'  {"":44s} {"put in":>8s} {"found":>8s}')
     for name, truth, value in (

@@ -16,7 +16,7 @@ from rotorsoil_ros.ground.elements.table import (
 from rotorsoil_ros.ground.soil import Circle, Contact, equivalent_radii, Soil
 
 # Part of every cache key: raise it when mesh, functions or fit change what a table says.
-ALGORITHM = 1
+ELEMENTS_ALGORITHM = 1
 
 
 def a0_range(

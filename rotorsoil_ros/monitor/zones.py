@@ -22,7 +22,7 @@ from rotorsoil_ros.monitor.inside import HYSTERESIS
 from rotorsoil_ros.monitor.vectors.history import STEADY
 
 # After this time without another vector a second is judged as it is [s].
-PATIENCE_S = 2.0
+SECOND_PATIENCE_S = 2.0
 
 # Only such vectors are motions of the housing: others are noise, runout or no number.
 _MOTIONS = (Reason.USED, Reason.NOT_QUASI_STATIC, Reason.NO_PREDICTION, Reason.OUT_OF_TABLE)
@@ -116,7 +116,7 @@ class Zones:
     def close(self, now_ns: float) -> None:
         """Judge the seconds to which nothing more will come at a time [ns]."""
         for channel, second in list(self._open.items()):
-            if (second.second + 1 + PATIENCE_S) * NANOSECONDS <= now_ns:
+            if (second.second + 1 + SECOND_PATIENCE_S) * NANOSECONDS <= now_ns:
                 self._judge(channel, self._open.pop(channel))
 
     def worst(self) -> list[HousingZone]:

@@ -30,7 +30,7 @@ from rclpy.task import Future
 from rotorsoil_ros.case import cache
 from rotorsoil_ros.case.loading import load_all
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.errors import BAD_INPUT, InputError, RotorSoilError
 from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
 from rotorsoil_ros.node.parameters import Settings
@@ -41,7 +41,6 @@ from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NOD
 PERIOD_S = 1.0
 SPIN_S = 0.1  # EventsExecutor dispatches nothing without a timeout; signals wait for it
 SWITCH_S = 5e-4  # that an answer may wait for the thread that writes the log
-BAD_INPUT = 2
 EXECUTORS = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
 
 

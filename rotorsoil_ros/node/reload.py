@@ -11,7 +11,7 @@ from rotorsoil_ros.background import Errand
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import RotorSoilError
 
-GLANCE_S = 0.05
+RELOAD_GLANCE_S = 0.05
 
 
 class Reloader:
@@ -32,7 +32,7 @@ class Reloader:
         self._check, self._load, self._take = check, load, take
         self._errand: Errand[Machine] | None = None
         self._timer = node.create_timer(
-            GLANCE_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            RELOAD_GLANCE_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
         self._service = node.create_service(Trigger, f'~/{name}/reload', self._serve)
 

@@ -22,7 +22,7 @@ from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
 
-TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
+SENT_TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
 DEPTH = 1000
 NAP_S = 0.05  # how soon an interrupt or a new subscriber is noticed
 DELIVERY_S = 5.0
@@ -93,7 +93,7 @@ class _Player:
     def __init__(self, node: Node, found: dict[str, str]) -> None:
         self._context = node.context
         self._publishers: dict[str, Publisher] = {
-            topic: node.create_publisher(TYPES[kind], topic, QoSProfile(depth=DEPTH))
+            topic: node.create_publisher(SENT_TYPES[kind], topic, QoSProfile(depth=DEPTH))
             for topic, kind in found.items()}
         self._speeds = [topic for topic, kind in found.items() if tells_speed(topic, kind)]
 

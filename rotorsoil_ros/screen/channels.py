@@ -11,7 +11,7 @@ from rotorsoil_ros.channel import Channel
 MICRO = 1e6  # [um, urad] per [m, rad]
 PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING = (
     'Probes', 'Discs', 'Journals', 'Housings', 'Block', 'Rocking of the block')
-COLOURS = ((78, 154, 230), (255, 159, 54), (80, 190, 90), (235, 90, 90), (178, 133, 219),
+CHANNEL_COLOURS = ((78, 154, 230), (255, 159, 54), (80, 190, 90), (235, 90, 90), (178, 133, 219),
            (190, 130, 115), (240, 145, 205), (160, 160, 160), (208, 209, 60), (60, 205, 220))
 
 
@@ -52,7 +52,7 @@ def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]
     shown: list[Trend] = []
     for channel in channels:
         kind = _kind(channel, owners[channel.station])
-        colour = COLOURS[sum(trend.kind == kind for trend in shown) % len(COLOURS)]
+        colour = CHANNEL_COLOURS[sum(trend.kind == kind for trend in shown) % len(CHANNEL_COLOURS)]
         entity = rr.new_entity_path([machine, channel.station, channel.motion])
         shown.append(Trend(channel, kind, entity, colour))
     return shown

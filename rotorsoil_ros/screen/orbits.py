@@ -21,12 +21,12 @@ from rotorsoil_ros.screen.recording import Recording
 
 PITCH, ROW = 2.7, 3.1  # between the centres of circles of radius 1
 POINTS = 33
-FRAME_NS = NANOSECONDS // 5
+ORBIT_NS = NANOSECONDS // 5
 TOGETHER_S = 0.5  # between the two directions of one measured orbit
 SMALLEST, LARGEST = 0.3, 0.95  # share of its circle, beyond which an orbit gets another scale
 OUTERMOST = 1.3  # where what is larger is cut off
 TURN = np.linspace(0.0, 2.0 * np.pi, POINTS)
-ENDS = (-1.0, 1.0)
+BOX_ENDS = (-1.0, 1.0)
 
 
 @dataclass(slots=True)
@@ -119,7 +119,7 @@ class Orbits:
 
     def predicted(self, stamp_ns: IntArray, displacement: ComplexArray) -> None:
         """Draw predicted orbits for displacements (n, channels) [m]."""
-        rows = self._recording.begins(self._entity, stamp_ns, FRAME_NS)
+        rows = self._recording.begins(self._entity, stamp_ns, ORBIT_NS)
         if not len(rows):
             return
         strips: list[list[FloatArray]] = []
@@ -159,7 +159,7 @@ class Orbits:
         index = nearest(x.stamp_ns, z.stamp_ns, tolerance_s=TOGETHER_S)
         rows = np.flatnonzero(index >= 0)
         rows = rows[self._recording.begins(
-            f'{self._entity}/{cell.station}', x.stamp_ns[rows], FRAME_NS)]
+            f'{self._entity}/{cell.station}', x.stamp_ns[rows], ORBIT_NS)]
         strips: list[list[FloatArray]] = []
         stamps, has_phase = x.stamp_ns[rows], False
         for stamp, row in zip(stamps.tolist(), rows.tolist(), strict=True):
@@ -243,5 +243,5 @@ def cells(case: Case, channels: Sequence[str]) -> list[Cell]:
 
 def _frame(centre: FloatArray) -> list[FloatArray]:
     circle = centre + np.column_stack([np.cos(TURN), np.sin(TURN)])
-    return [circle, centre + np.array([(end, 0.0) for end in ENDS]),
-            centre + np.array([(0.0, end) for end in ENDS])]
+    return [circle, centre + np.array([(end, 0.0) for end in BOX_ENDS]),
+            centre + np.array([(0.0, end) for end in BOX_ENDS])]

@@ -127,7 +127,7 @@ class TrendLines:
 
 MEASURED, PREDICTED = 'measured', 'predicted'
 UNKNOWN = '-'
-COLOURS = {'A': (40, 150, 75), 'B': (140, 190, 70), 'C': (225, 160, 30), 'D': (205, 55, 50),
+ZONE_FILLS = {'A': (40, 150, 75), 'B': (140, 190, 70), 'C': (225, 160, 30), 'D': (205, 55, 50),
            UNKNOWN: (70, 70, 70)}
 
 
@@ -163,6 +163,6 @@ class ZoneLane:
         lane = f'{self._entity}/{source}/{channel}'
         if before is None:
             self._recording.still(lane, rr.StateConfiguration(
-                values=list(COLOURS), labels=[*list(COLOURS)[:-1], f'not {source}'],
-                colors=list(COLOURS.values())))
+                values=list(ZONE_FILLS), labels=[*list(ZONE_FILLS)[:-1], f'not {source}'],
+                colors=list(ZONE_FILLS.values())))
         self._recording.send(lane, np.array([stamp_ns]), rr.StateChange.columns(state=[zone]))

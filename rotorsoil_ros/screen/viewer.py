@@ -38,7 +38,7 @@ from rotorsoil_ros.screen.waterfall import ORDERS, Waterfall
 
 APPLICATION = 'rotorsoil'
 HELD_NS = 5 * NANOSECONDS  # of a run that nobody looks at: a chunk costs a kilobyte
-LEVELS = {Level.OK: 'INFO', Level.WARN: 'WARN', Level.ERROR: 'ERROR', Level.STALE: 'WARN'}
+TEXT_LEVELS = {Level.OK: 'INFO', Level.WARN: 'WARN', Level.ERROR: 'ERROR', Level.STALE: 'WARN'}
 
 
 class RerunSink:
@@ -215,7 +215,7 @@ class MachineView:
     def _write(self, level: Level, text: str, stamp_ns: int) -> None:
         self._recording.send(self._shown.entity('events'), np.array([stamp_ns]),
                              rr.TextLog.columns(
-                                 text=[f'{_clock(stamp_ns)}  {text}'], level=[LEVELS[level]]))
+                                 text=[f'{_clock(stamp_ns)}  {text}'], level=[TEXT_LEVELS[level]]))
 
     def _take_model(self, event: Model) -> None:
         """Draw what is predicted over speed anew if it rests on something else now."""

@@ -17,9 +17,9 @@ PERIOD_NS = 2 * NANOSECONDS
 ORDERS = 6  # of the fastest speed, that are shown
 QUIETEST, LOUDEST = 0.001, 10.0  # [mm/s rms], darkest and brightest
 LOWEST_HZ = 2.0  # below it the integration of acceleration shows nothing but its noise
-FEWEST = 64
+FEWEST_SAMPLES = 64
 FASTEST_HZ = 65_536.0
-BOUNDS = rrb.VisualBounds2D(x_range=(-14.0, COLUMNS + 6.0), y_range=(-12.0, ROWS + 10.0))
+WATERFALL_BOUNDS = rrb.VisualBounds2D(x_range=(-14.0, COLUMNS + 6.0), y_range=(-12.0, ROWS + 10.0))
 SPEED = (255, 255, 255, 110)
 
 
@@ -45,7 +45,8 @@ class Waterfall:
     @staticmethod
     def view(entity: str, channel: str) -> rrb.View:
         """Return the view of a channel."""
-        return rrb.Spatial2DView(name=f'{channel} [Hz]', origin=entity, visual_bounds=BOUNDS)
+        return rrb.Spatial2DView(
+            name=f'{channel} [Hz]', origin=entity, visual_bounds=WATERFALL_BOUNDS)
 
     def take(self, event: Samples, speed: float) -> None:
         """Add samples, and the speed at their end [rad/s]; draw when a period is full."""
@@ -122,7 +123,7 @@ def spectrum(stamp_ns: IntArray, acceleration: FloatArray) -> tuple[FloatArray, 
     time = (stamp_ns - stamp_ns[0]) / NANOSECONDS
     known = np.isfinite(acceleration) & (np.diff(time, prepend=-1.0) > 0.0)
     time, samples = time[known], acceleration[known]
-    if len(time) < FEWEST:
+    if len(time) < FEWEST_SAMPLES:
         return np.empty(0), np.empty(0)
     step = max(float(np.median(np.diff(time))), 1.0 / FASTEST_HZ)
     even = np.interp(np.arange(0.0, time[-1], step), time, samples - samples.mean())

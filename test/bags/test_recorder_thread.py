@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from rotorsoil_ros.bags.metadata import files as bag_files
-from rotorsoil_ros.bags.recorder import BagAside, BATCH, Recorder
+from rotorsoil_ros.bags.recorder import BagAside, ITEMS_AT_ONCE, Recorder
 from rotorsoil_ros.events import Level
 
 from records import joint_records, read_all, START, string_records
@@ -57,7 +57,7 @@ class Desk:
 
 @pytest.fixture
 def desk(tmp_path, monkeypatch):
-    monkeypatch.setattr('rotorsoil_ros.bags.recorder.BACKLOG', BACKLOG)
+    monkeypatch.setattr('rotorsoil_ros.bags.recorder.LOG_BACKLOG', BACKLOG)
     desk = Desk(tmp_path)
     yield desk
     desk.goes.set()
@@ -66,7 +66,7 @@ def desk(tmp_path, monkeypatch):
 
 def test_all_that_came_is_logged_in_its_order_when_the_run_ends(desk, tmp_path):
     sent = [joint_records(1, start=START + step * 10**6, topic=f'/{step % 3}')
-            for step in range(9 * BATCH + 10)]
+            for step in range(9 * ITEMS_AT_ONCE + 10)]
     for records in sent:
         desk.aside.write(records)
     desk.aside.close()

@@ -14,7 +14,7 @@ from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
 from rotorsoil_ros.monitor.vectors.stretch import Finding, Stretch, TOLD
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
-MOST = 1 << 16  # samples of a channel that wait for their speed
+MOST_SAMPLES = 1 << 16  # samples of a channel that wait for their speed
 
 # Axes that a sensor says are turned by more than this are not those of the machine [rad].
 _TURNED = math.radians(5.0)
@@ -41,7 +41,7 @@ class Demodulator:
         turned = samples.turned if len(samples.turned) else np.zeros(len(samples.stamp_ns))
         self._parts.append((samples.stamp_ns, samples.acceleration, turned))
         self._count += len(samples.stamp_ns)
-        while self._count > MOST and len(self._parts) > 1:
+        while self._count > MOST_SAMPLES and len(self._parts) > 1:
             gone = len(self._parts.pop(0)[0])
             self._count -= gone
             self.left_out += gone

@@ -152,7 +152,7 @@ class Turning:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class OrderFit:
     """
     What samples are made of, by least squares.
 
@@ -240,9 +240,9 @@ def demodulate(
                        deviations(found, orders, speed=speed), track.has_phase)
 
 
-def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> Fit:
+def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> OrderFit:
     """
-    Fit displacement vectors of several orders, an offset and a drift to acceleration samples.
+    OrderFit displacement vectors of several orders, an offset and a drift to acceleration samples.
 
     Raises
     ------
@@ -281,11 +281,11 @@ def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> Fi
     variance = float(residual @ residual) / (number - unknowns)
     parts = solution[:-2].reshape(-1, 4)
     spread = np.diag(inverse)[:-2].reshape(-1, 4)[:, :2].max(axis=1)
-    return Fit(parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3],
+    return OrderFit(parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3],
                np.sqrt(variance * spread), residual, once)
 
 
-def deviations(found: Fit, orders: Sequence[int], *, speed: float) -> FloatArray:
+def deviations(found: OrderFit, orders: Sequence[int], *, speed: float) -> FloatArray:
     """
     Return the standard errors of the first k fitted orders at a speed [rad/s], (k,) [m].
 

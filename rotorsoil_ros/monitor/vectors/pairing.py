@@ -13,7 +13,7 @@ from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Demodulated, Measured, NANOSECONDS
 from rotorsoil_ros.monitor.vectors.history import History
 
-MOST = 1024  # vectors that wait; what waits longer is given up
+MOST_UNMATCHED = 1024  # vectors that wait; what waits longer is given up
 LARGEST_MOTION = 1e3  # [m, rad]; no machine moves further
 PATIENCE = 2  # ticks after which an amplitude goes without its phase
 
@@ -109,7 +109,7 @@ class Pairing:
                 self._wait(vectors)
             else:
                 self._halves[key] = vectors
-        while len(self._halves) > MOST:
+        while len(self._halves) > MOST_UNMATCHED:
             self._part(next(iter(self._halves)))
 
     def take_demodulated(self, found: Demodulated) -> None:
@@ -157,7 +157,7 @@ class Pairing:
 
     def _wait(self, vectors: Vectors) -> None:
         self._waiting.append(vectors)
-        if len(self._waiting) > MOST:
+        if len(self._waiting) > MOST_UNMATCHED:
             self._waiting.popleft()
             self.given_up += 1
 

@@ -10,8 +10,8 @@ from rotorsoil_ros.arrays import BoolArray, FloatArray
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.monitor.vectors.orders import (
     deviations,
-    Fit,
     fit,
+    OrderFit,
     OrderVector,
     SpeedTrack,
     Turning,
@@ -169,7 +169,7 @@ class Finding:
         return told
 
     def _scatter(
-        self, found: Fit, taken: Sampling, speed: float, orders: list[int],
+        self, found: OrderFit, taken: Sampling, speed: float, orders: list[int],
     ) -> float | Refusal:
         """Return the phase of 1X by which stamps may be wrong [rad], or refuse them."""
         grids = list(self._held_against(found, taken, speed, orders))
@@ -185,7 +185,7 @@ class Finding:
         return worst
 
     def _held_against(
-        self, found: Fit, taken: Sampling, speed: float, orders: list[int],
+        self, found: OrderFit, taken: Sampling, speed: float, orders: list[int],
     ) -> Iterator[tuple[float, float]]:
         """Yield by how much likelier each even grid is than the stamps, and how far apart."""
         for grid in self._grids(taken):
@@ -200,7 +200,7 @@ class Finding:
             yield np.clip(grid, begin, end)
 
 
-def _of_fit(found: Fit, size: float, error: float, speed: float) -> Refusal | None:
+def _of_fit(found: OrderFit, size: float, error: float, speed: float) -> Refusal | None:
     """Return why a vector of 1X with its standard error [m] at a speed [rad/s] is none."""
     if flaw := jump(found.residual, first=size * speed**2, deviation=error * speed**2):
         return flaw
