@@ -214,10 +214,11 @@ class Judge:
         reason = np.full(compared.amplitude.shape, Reason.USED, dtype=object)
         for why, holds in (  # the last that holds is told
                 (Reason.NOT_QUASI_STATIC, ~(lag[:, None] <= rules.largest_lag)),
-                (Reason.BELOW_NOISE, compared.amplitude < floor),
-                (Reason.SLOW_ROLL, self.runout.is_rolling(speed)),
                 (Reason.NO_PREDICTION, ~np.isfinite(compared.predicted)),
                 (Reason.OUT_OF_TABLE, (speed < lowest) | (speed > highest)),
+                # Noise and runout are no motion of a housing either, predicted or not.
+                (Reason.BELOW_NOISE, compared.amplitude < floor),
+                (Reason.SLOW_ROLL, self.runout.is_rolling(speed)),
                 (Reason.NOT_FINITE, ~np.isfinite(compared.amplitude)),
                 (Reason.NO_SPEED, ~np.isfinite(speed))):
             reason[np.broadcast_to(holds, reason.shape)] = why

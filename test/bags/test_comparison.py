@@ -231,7 +231,9 @@ def test_points_say_why_they_do_not_count(fan, tmp_path):
     assert points.excluded.keys() == {'outside the speed range of the prediction'}
     wish = Wish(matching=Matching(noise=1e-3))
     [points] = compare(log, FAN, wish, cache_directory=fan.directory).points
-    assert points.excluded.keys() == {'outside the speed range of the prediction', 'below noise'}
+    assert points.excluded == {'below noise': 60}
+    quiet = compare(log, FAN, wish, cache_directory=fan.directory)
+    assert [entry for entry in quiet.zones if entry.source == 'measured'] == []
     stranger = write(tmp_path / 'stranger.mcap', np.full(40, 100.0), np.full(40, 1e-5),
                      channel='fan_end_housin_x')
     [points] = compare(stranger, FAN, cache_directory=fan.directory).points
