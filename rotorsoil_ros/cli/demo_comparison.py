@@ -85,7 +85,7 @@ def _print(found: Identification, comparison: Comparison, *, start_ns: int) -> N
     first, last = put_in(comparison, given, start_ns=start_ns)
     start, growth = (complex(found.moment[found.columns.index(name)])
                      for name in (PLANE, f'growth of {PLANE}'))
-    print(f'{CASE}: SYNTHETIC_FAN sensors of {comparison.run.time[-1]:.0f} s, '
+    print(f'{CASE}: SYNTHETIC sensors of {comparison.run.time[-1]:.0f} s, '
           'compared with the case')
     print(f'  {"":44s} {"put in":>8s} {"found":>8s}')
     for name, truth, value in (

@@ -365,9 +365,12 @@ def accelerations(layout: Layout, cdrs: Sequence[bytes]) -> Accelerations:
 def _turned(rows: np.ndarray) -> FloatArray:
     """Return the angles (n,) by which orientations turn [rad], 0 where none is told."""
     quaternion = rows['orientation'].astype(float)
-    size = np.sqrt(np.sum(quaternion**2, axis=1))
-    is_told = (np.isfinite(size) & (size > 0.0)
+    largest = np.max(np.abs(quaternion), axis=1)
+    is_told = (np.isfinite(largest) & (largest > 0.0)
                & (rows['orientation_covariance'][:, 0] != NOT_MEASURED))
+    # Only its direction counts; whoever sends 1e300 must not make squares overflow.
+    quaternion = np.where(is_told[:, None], quaternion, 0.0) / np.where(
+        is_told, largest, 1.0)[:, None]
     # The whole angle from both parts: of a small one the cosine alone has no digits.
     angle = 2.0 * np.arctan2(np.linalg.norm(quaternion[:, :3], axis=1),
                              np.abs(quaternion[:, 3]))

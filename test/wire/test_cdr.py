@@ -8,7 +8,12 @@ from rosbags.typesys import get_typestore, Stores
 from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.cdr import joint_states as decode, JointStateReader, Layout
+from rotorsoil_ros.wire.cdr import (
+    _turned,
+    joint_states as decode,
+    JointStateReader,
+    Layout,
+)
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 
 NUMBERS = some.floats(allow_nan=False)
@@ -108,3 +113,13 @@ def test_runs_keep_the_order_and_set_the_malformed_apart():
     assert runs[2][1] is None
     np.testing.assert_array_equal(runs[0][1].velocity, [[1.0], [1.0]])
     np.testing.assert_array_equal(runs[1][1].velocity, [[2.0, 3.0]])
+
+
+@pytest.mark.parametrize('size', [1.0, 1e300, 5e-324, np.nan, np.inf, 0.0])
+def test_size_of_an_orientation_does_not_matter(size):
+    """A quarter turn about x: any multiple of (1, 0, 0, 1) / sqrt(2)."""
+    kind = np.dtype([('orientation', '<f8', (4,)), ('orientation_covariance', '<f8', (9,))])
+    rows = np.zeros(1, dtype=kind)
+    rows['orientation'] = [size, 0.0, 0.0, size]
+    told = np.isfinite(size) and size > 0.0
+    assert _turned(rows)[0] == pytest.approx(0.5 * np.pi if told else 0.0)
