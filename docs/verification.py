@@ -33,7 +33,8 @@ from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, RigidSoil, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.machine.modes.campbell import campbell
+from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.rotor import beam
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.disc import Disc

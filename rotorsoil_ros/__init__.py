@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from rotorsoil_ros.machine.band import SoilSpread
     from rotorsoil_ros.machine.coupled import CoupledModel
     from rotorsoil_ros.machine.foundation import Foundation
-    from rotorsoil_ros.machine.modes import Campbell, CriticalSpeed
+    from rotorsoil_ros.machine.modes.campbell import Campbell
+    from rotorsoil_ros.machine.modes.critical import CriticalSpeed
     from rotorsoil_ros.machine.response import Predictor, ResponseTable
     from rotorsoil_ros.monitor.comparison import Comparison
     from rotorsoil_ros.monitor.rules import Matching
@@ -72,7 +73,8 @@ _ROOMS = {
     'machine.band': ('SoilSpread',),
     'machine.coupled': ('CoupledModel',),
     'machine.foundation': ('Foundation',),
-    'machine.modes': ('Campbell', 'CriticalSpeed'),
+    'machine.modes.campbell': ('Campbell',),
+    'machine.modes.critical': ('CriticalSpeed',),
     'machine.response': ('Predictor', 'ResponseTable'),
     'monitor.comparison': ('Comparison',),
     'monitor.rules': ('Matching',),

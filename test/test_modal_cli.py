@@ -10,7 +10,8 @@ import pytest
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.cli import main
-from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.machine.modes.campbell import campbell
+from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
 ROOT = Path(__file__).parents[1]

@@ -12,7 +12,7 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.loading import Machine
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.events import Diagnostics, Level, Predicted, Remark
-from rotorsoil_ros.machine.stability import stability
+from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.verdict import Verdict

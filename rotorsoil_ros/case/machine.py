@@ -17,9 +17,10 @@ from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes import Campbell, campbell, critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
+from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.machine.stability import Stability, stability
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 

@@ -20,7 +20,7 @@ from rotorsoil_ros.ground.accuracy import (
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.stability import Stability
+from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.rotor.bearing import SpeedTable
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 

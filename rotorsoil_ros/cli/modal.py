@@ -13,8 +13,8 @@ from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.mode_names import ModeNames
-from rotorsoil_ros.machine.modes import asked, CriticalSpeed
+from rotorsoil_ros.machine.modes.critical import asked, CriticalSpeed
+from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.peaks import half_power_factors
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 

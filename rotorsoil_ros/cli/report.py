@@ -23,11 +23,11 @@ from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.mode_names import ModeNames
-from rotorsoil_ros.machine.modes import asked, critical_speeds
+from rotorsoil_ros.machine.modes.critical import asked, critical_speeds
+from rotorsoil_ros.machine.modes.names import ModeNames
+from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.machine.peaks import Peak, resonances
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.machine.stability import Stability
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Amplification factor below which a critical speed needs no margin (API 617).

@@ -14,7 +14,8 @@ from rotorsoil_ros.channel import across
 from rotorsoil_ros.figures.response import COLOURS, draw_shape, FELT, tidy, title_of
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.modes import Campbell, campbell, critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
+from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.peaks import Peak, resolved_speeds
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm

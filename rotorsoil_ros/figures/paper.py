@@ -14,7 +14,7 @@ from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import RigidSoil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import add_mass
-from rotorsoil_ros.machine.modes import campbell
+from rotorsoil_ros.machine.modes.campbell import campbell
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rad_s_to_rpm

@@ -18,7 +18,7 @@ from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import Circle
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.peaks import Peak, resolved_speeds, resonances
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
 from rotorsoil_ros.rotor.shaft import Probe

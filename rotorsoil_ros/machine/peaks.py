@@ -9,7 +9,7 @@ import numpy as np
 from rotorsoil_ros.arrays import FloatArray, prominent_peaks
 from rotorsoil_ros.channel import ACROSS, HOUSING
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes import CriticalSpeed
+from rotorsoil_ros.machine.modes.critical import CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor
 
 # Points per piece of the table: its polynomials are smooth, a peak spans several.

@@ -9,8 +9,8 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.pieces import DEGREE, evaluate, evaluate_one, Pieces, refine
-from rotorsoil_ros.machine.stability import Stability, stability
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.units import rad_s_to_rpm
 

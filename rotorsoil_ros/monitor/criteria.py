@@ -18,7 +18,7 @@ from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
 from rotorsoil_ros.monitor.quasistatic import Resonance
 

@@ -18,7 +18,8 @@ from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.ross import read
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.machine.modes.campbell import campbell
+from rotorsoil_ros.machine.modes.critical import critical_speeds
 
 from oracles.published import ross_criticals, ross_figures, ROSS_FILES, ross_response
 

@@ -15,7 +15,7 @@ from rotorsoil_ros.cli import main
 from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.figures.modal import modal_figures
 from rotorsoil_ros.figures.response import all_figures, trend
-from rotorsoil_ros.machine.modes import critical_speeds
+from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 

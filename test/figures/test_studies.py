@@ -12,7 +12,7 @@ from rotorsoil_ros.case.config import load
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.response import compliance_figure, main_peaks
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.machine.modes import critical_speeds
+from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'

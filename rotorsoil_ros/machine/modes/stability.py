@@ -12,9 +12,9 @@ from scipy.optimize import linear_sum_assignment
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, solved
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.feeding import fastest, Feed, feeds, highest_fed, knots
-from rotorsoil_ros.machine.mode_names import ModeNames
-from rotorsoil_ros.machine.pencil import Pencil, Vibrations
+from rotorsoil_ros.machine.modes.feeding import fastest, Feed, feeds, highest_fed, knots
+from rotorsoil_ros.machine.modes.names import ModeNames
+from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 from rotorsoil_ros.units import rad_s_to_rpm
 
 # A vibration grows if it gains more than this share of |lambda|: less is round-off.

@@ -6,8 +6,8 @@ import pytest
 from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.mode_names import ModeNames
-from rotorsoil_ros.machine.modes import critical_speeds
+from rotorsoil_ros.machine.modes.critical import critical_speeds
+from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.rotor.bearing import Pedestal
 from rotorsoil_ros.rotor.disc import Disc
 

@@ -1,24 +1,21 @@
-"""The machine's own vibration over speed, and the speeds that are critical."""
+"""Which speeds are critical, and which distance from them a standard asks for."""
 
 from dataclasses import dataclass
 import itertools
 import math
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError, solved
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.spectrum import Spectrum, SpectrumSolver
+from rotorsoil_ros.machine.modes.campbell import follow, unit_shapes
+from rotorsoil_ros.machine.modes.spectrum import Spectrum, SpectrumSolver
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Speeds at which the search for criticals begins, and up to how many it looks closer.
 _FIRST_SPEEDS = 41
 _MOST_SPEEDS = 400
-
-# A mode continues a curve if its shape is more alike than its frequency is apart by this much.
-_ALIKE = 0.1
 
 # Modes that cross omega = Omega in the range lie below this many times its end.
 _ABOVE = 1.1
@@ -36,90 +33,6 @@ MARGIN_BELOW, MARGIN_ABOVE = 0.16, 0.26
 
 # Beyond the largest margin by so much: a critical speed just at it is still found.
 _MARGIN_ROUND_OFF = 1e-6
-
-
-@dataclass(frozen=True)
-class Campbell:
-    """
-    Free vibration over rotor speed, modes sorted by frequency.
-
-    Attributes
-    ----------
-    speed : (n,) float array
-        Rotor speed [rad/s].
-    eigenvalue : (n, m) complex array
-        lambda of exp(lambda t) [rad/s]; NaN where a speed has fewer modes.
-    whirl : (n, m) int array
-        +1 forward, -1 backward, 0 where there is no mode.
-    branch : (n, m) int array
-        Which curve a mode belongs to, followed across speed by its shape; -1 where there is no
-        mode.
-    untold : (n,) float array
-        Lowest frequency of a light vibration that is missing, because what is known of the
-        support does not determine it [rad/s]; infinite where there is none.
-
-    """
-
-    speed: FloatArray
-    eigenvalue: ComplexArray
-    whirl: IntArray
-    branch: IntArray
-    untold: FloatArray
-
-    @property
-    def speed_rpm(self) -> FloatArray:
-        """Rotor speed, (n,) [rpm]."""
-        return rad_s_to_rpm(self.speed)
-
-    @property
-    def frequency_hz(self) -> FloatArray:
-        """Damped frequency, (n, m) [Hz]."""
-        return rad_s_to_hz(self.omega)
-
-    @property
-    def omega(self) -> FloatArray:
-        """Damped frequency abs(Im lambda), (n, m) [rad/s]."""
-        return np.abs(self.eigenvalue.imag)
-
-    @property
-    def damping_ratio(self) -> FloatArray:
-        """-Re lambda / abs(lambda), (n, m) [-]; negative is unstable."""
-        return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
-
-
-@solved('the modes of this machine')
-def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
-    """
-    Return the lowest modes at each speed.
-
-    Parameters
-    ----------
-    model : CoupledModel
-        The machine.
-    speeds : (n,) float array
-        Rotor speeds, rising for the branches to make sense [rad/s].
-    count : int
-        Modes wanted at each speed. Fewer are returned where the machine has no more, or where
-        the table of a soil ends below them.
-
-    Notes
-    -----
-    Every mode obeys the compliance of the soil at its own frequency, continued from real
-    frequencies to its decaying vibration, S(lambda / i). What is overdamped has no frequency
-    and is left out.
-
-    References
-    ----------
-    Theory manual, modes; API 684 for the use of the diagram.
-
-    """
-    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
-    if not (len(speeds) and np.all(np.isfinite(speeds)) and np.all(speeds >= 0.0)):
-        raise RotorSoilError(f'speeds must be >= 0 rad/s and finite, got {speeds}')
-    if not count >= 1:
-        raise RotorSoilError(f'count must be at least 1 mode, got {count}')
-    found = SpectrumSolver.lowest(model, speeds, count)
-    return Campbell(speeds, 1j * found.frequency, found.whirl, _follow(found), found.untold)
 
 
 @dataclass(frozen=True)
@@ -231,7 +144,7 @@ def critical_speeds(
     speed = np.linspace(low, high, _FIRST_SPEEDS)
     while True:
         solver, found = solver.refined(speed, _ALL)
-        branch = _follow(found)
+        branch = follow(found)
         closer = np.setdiff1d(np.concatenate([
             _touching(speed, found, branch), _torn(speed, found, branch)]), speed)
         if not len(closer) or len(speed) > _MOST_SPEEDS:
@@ -244,27 +157,6 @@ def critical_speeds(
             'Hz to tell a lightly damped mode there')
     criticals = _close(solver, *_crossings(speed, found, branch))
     return tuple(sorted(criticals, key=lambda critical: critical.speed))
-
-
-def _follow(found: Spectrum) -> IntArray:
-    """Give a mode the number of the curve whose shape and frequency come closest."""
-    exists = np.isfinite(found.frequency)
-    shape = _unit(found.shape)
-    branch = np.full(exists.shape, -1)
-    branch[0, exists[0]] = np.arange(exists[0].sum())
-    free = int(exists[0].sum())
-    for index in range(1, len(branch)):
-        old, new = np.flatnonzero(exists[index - 1]), np.flatnonzero(exists[index])
-        likeness = np.abs(shape[index - 1, old].conj() @ shape[index, new].T)
-        before, after = found.frequency[index - 1, old, None], found.frequency[index, new]
-        gap = np.abs(after - before) / np.abs(after + before)
-        ends, starts = linear_sum_assignment(gap - likeness)
-        alike = (likeness - gap)[ends, starts] > _ALIKE
-        branch[index, new[starts[alike]]] = branch[index - 1, old[ends[alike]]]
-        fresh = new[branch[index, new] < 0]
-        branch[index, fresh] = free + np.arange(len(fresh))
-        free += len(fresh)
-    return branch
 
 
 def _touching(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
@@ -316,14 +208,14 @@ def _close(
     """Close all brackets at once by the false position, in its Illinois variant."""
     if not len(ends):
         return []
-    wanted, rows = _unit(shapes).conj().transpose(0, 2, 1), np.arange(len(ends))
+    wanted, rows = unit_shapes(shapes).conj().transpose(0, 2, 1), np.arange(len(ends))
     last = np.full(len(ends), -1)
     for _ in range(_STEPS):
         speed = ((ends[:, 0] * excess[:, 1] - ends[:, 1] * excess[:, 0])
                  / (excess[:, 1] - excess[:, 0]))
         found = solver.solve(speed, _ALL)
         # Of all modes at a speed the one most like those at both ends.
-        mode = np.nansum(np.abs(_unit(found.shape) @ wanted), axis=2).argmax(axis=1)
+        mode = np.nansum(np.abs(unit_shapes(found.shape) @ wanted), axis=2).argmax(axis=1)
         height = found.frequency[rows, mode].real - speed
         if np.all(np.abs(height) <= _FOUND * speed):
             break
@@ -345,8 +237,3 @@ def _critical(
     return CriticalSpeed(speed, int(found.whirl[row, mode]),
                          float(frequency.imag / np.abs(frequency)),
                          deflection / largest, support / largest)
-
-
-def _unit(shape: ComplexArray) -> ComplexArray:
-    length = np.linalg.norm(shape, axis=-1, keepdims=True)
-    return np.asarray(shape / np.where(length > 0.0, length, 1.0))

@@ -8,7 +8,7 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.rational import States
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.spectrum import SpectrumSolver
+from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.rotor.whirl import ORBITS
 
 # Poles of the soil that weigh less than this are noise of their fit: each would be a mode.

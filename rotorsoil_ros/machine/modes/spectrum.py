@@ -10,7 +10,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.rational import Continuation
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.eigen import FreeVibration
+from rotorsoil_ros.machine.modes.eigen import FreeVibration
 from rotorsoil_ros.rotor.reduced import ReducedRotor
 from rotorsoil_ros.rotor.whirl import held, ORBITS
 from rotorsoil_ros.units import rad_s_to_rpm

@@ -10,7 +10,7 @@ import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.pencil import Pencil, Vibrations
+from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
 from rotorsoil_ros.rotor.whirl import held
 

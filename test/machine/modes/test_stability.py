@@ -10,10 +10,10 @@ from rotorsoil_ros.errors import OutOfTableError
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.feeding import highest_fed
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.pencil import Pencil
-from rotorsoil_ros.machine.stability import Stability, stability
+from rotorsoil_ros.machine.modes.feeding import highest_fed
+from rotorsoil_ros.machine.modes.pencil import Pencil
+from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
 from rotorsoil_ros.rotor.disc import Disc

@@ -9,7 +9,7 @@ import scipy.linalg
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes import CriticalSpeed
+from rotorsoil_ros.machine.modes.critical import CriticalSpeed
 from rotorsoil_ros.rotor.whirl import held
 
 # Motion of a block over (x, y, z, rx, ry, rz): the shaft points along y.

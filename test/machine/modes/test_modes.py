@@ -11,12 +11,13 @@ from rotorsoil_ros.ground import rational
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
-from rotorsoil_ros.machine import eigen, modes, spectrum
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.modes import campbell, critical_speeds
+from rotorsoil_ros.machine.modes import eigen, spectrum
+from rotorsoil_ros.machine.modes.campbell import campbell
+from rotorsoil_ros.machine.modes.critical import critical_speeds
+from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.machine.peaks import half_power_factors
-from rotorsoil_ros.machine.spectrum import SpectrumSolver
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
 from rotorsoil_ros.rotor.disc import Disc
@@ -522,7 +523,7 @@ def test_crossings_where_a_curve_was_torn_are_not_missed(monkeypatch):
     model = paper_machine(RigidSoil())
     expected = [one.speed for one in critical_speeds(model, (10.0, 942.0))]
     # Shapes of neighbouring speeds count as those of other curves until these are very close.
-    monkeypatch.setattr(modes, '_ALIKE', 0.999)
+    monkeypatch.setattr('rotorsoil_ros.machine.modes.campbell._ALIKE', 0.999)
     got = [one.speed for one in critical_speeds(model, (10.0, 942.0))]
     np.testing.assert_allclose(got, expected, rtol=1e-9)
 
@@ -625,8 +626,8 @@ def test_a_peak_belongs_to_the_nearest_mode_and_a_damped_mode_may_have_none():
     model = paper_machine()
     criticals = critical_speeds(model, (150.0, 320.0))
     factors = half_power_factors(model, criticals)
-    for critical, factor in zip(criticals, factors, strict=True):
-        assert math.isfinite(factor) or critical.amplification_factor < 1.0 or critical.whirl < 0
+    for found, factor in zip(criticals, factors, strict=True):
+        assert math.isfinite(factor) or found.amplification_factor < 1.0 or found.whirl < 0
     assert sum(map(math.isfinite, factors)) >= 1
 
 
