@@ -19,7 +19,8 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.machine.band import ResponseBand, SoilSpread
+from rotorsoil_ros.machine.band import ResponseBand
+from rotorsoil_ros.machine.spread import SoilSpread
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 SAMPLES = 200_000
@@ -61,7 +62,8 @@ def band(machine: Machine) -> None:
     case, model = machine.case, machine.model
     assert case.soil is not None
     start = time.process_time()
-    [_, *soils] = SoilSpread().soils(case.soil)
+    spread = SoilSpread()
+    soils = [spread.soil(case.soil, place) for place in spread.places(with_soil=True)[1:]]
     others = (replace(model, soil_models=[ConeModel(soil, foundation.contact)
                                           for foundation in model.foundations])
               for soil in soils)

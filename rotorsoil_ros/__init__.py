@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from rotorsoil_ros.ground.half_space import InfiniteElementModel
     from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil, Soil, SoilModel
     from rotorsoil_ros.ground.table import ComplianceTable
-    from rotorsoil_ros.machine.band import SoilSpread
     from rotorsoil_ros.machine.coupled import CoupledModel
     from rotorsoil_ros.machine.foundation import Foundation
     from rotorsoil_ros.machine.modes.campbell import Campbell
     from rotorsoil_ros.machine.modes.critical import CriticalSpeed
     from rotorsoil_ros.machine.response import Predictor, ResponseTable
+    from rotorsoil_ros.machine.spread import SoilSpread
     from rotorsoil_ros.monitor.comparison import Comparison
     from rotorsoil_ros.monitor.rules import Matching
     from rotorsoil_ros.monitor.verdict import Verdict
@@ -70,12 +70,12 @@ _ROOMS = {
     'ground.half_space': ('InfiniteElementModel',),
     'ground.soil': ('Circle', 'Rectangle', 'RigidSoil', 'Soil', 'SoilModel'),
     'ground.table': ('ComplianceTable',),
-    'machine.band': ('SoilSpread',),
     'machine.coupled': ('CoupledModel',),
     'machine.foundation': ('Foundation',),
     'machine.modes.campbell': ('Campbell',),
     'machine.modes.critical': ('CriticalSpeed',),
     'machine.response': ('Predictor', 'ResponseTable'),
+    'machine.spread': ('SoilSpread',),
     'monitor.comparison': ('Comparison',),
     'monitor.rules': ('Matching',),
     'monitor.verdict': ('Verdict',),

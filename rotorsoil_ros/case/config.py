@@ -21,10 +21,10 @@ from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import a0_range
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
-from rotorsoil_ros.machine.band import SoilSpread
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.response import bytes_needed
+from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.units import rpm_to_rad_s
 

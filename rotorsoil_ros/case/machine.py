@@ -236,7 +236,7 @@ class Machine:
 
     def band(self, *, rpm: Numbers) -> Bounds:
         """
-        Return between which amplitudes the response lies on all soils of the case's spread.
+        Return between which amplitudes the response lies, as far as the case is known.
 
         Parameters
         ----------
@@ -251,14 +251,14 @@ class Machine:
         Raises
         ------
         InputError
-            If the support knows of no soil, so that there is no band.
+            If nothing of the case is uncertain, so that there is no band.
 
         """
         speed = rpm_to_rad_s(_numbers('rpm', rpm))
         found = models.response_band(self.case, self.model, self.table, self.directory)
         if found is None:
             raise InputError(f'{self.case.path}: support.model: {self.case.support.model} knows '
-                             'of no soil, so that there is no band')
+                             'of no soil and uncertainty says nothing else: there is no band')
         nominal = self.table.predictor(self.case.unbalance).answer(speed)
         bounds = found.envelope(self.case.unbalance).at(speed).around(nominal.displacement)
         return Bounds(self.table.channels, speed, bounds.low, np.abs(nominal.displacement),

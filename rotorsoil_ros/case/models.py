@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 from rotorsoil_ros.case.cache import Cache, content_key
@@ -20,10 +21,10 @@ from rotorsoil_ros.machine.band import (
     of_other_form,
     on_soils,
     ResponseBand,
-    SoilSpread,
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
+from rotorsoil_ros.machine.spread import SoilSpread
 
 # Rectangles that are longer than any that was measured are taken to be off by this.
 _LARGEST_MAPPING = 0.5
@@ -172,40 +173,45 @@ def response_band(
     """
     Return the response of a case on all soils of its spread, or of another one.
 
-    Besides the soil it holds the spread of the bearings and, unless the spread says otherwise,
-    the error of the models: every second machine stands on infinite elements instead of cones,
-    and of each pair of these one on ground as much stiffer as a rectangle may be than its disc.
-    None on a support that knows of no soil.
+    Besides the soil it holds what else the spread says and, unless that says otherwise, the
+    error of the models: every second machine stands on infinite elements instead of cones, and
+    of each pair of these one on ground as much stiffer as a rectangle may be than its disc.
+    None where nothing is uncertain, as with known bearings on a support that knows of no soil.
     """
-    if case.soil is None or not depends_on_soil(model):
-        return None
     spread = spread or case.uncertainty
-    soils = spread.soils(case.soil, highest_poisson_ratio=highest_poisson_ratio(model))
+    with_soil = case.soil is not None and depends_on_soil(model)
+    if not with_soil and not spread.inputs(with_soil=False):
+        return None
     elements, stiffer = _other_forms(case, spread, directory)
-    forms = list(_forms(soils, with_elements=bool(elements), with_stiffer=any(stiffer)))
-    forms = forms[:spread.samples - 1]
-    machines = on_soils(model, [soil for soil, _, _ in forms])
-    factors = spread.bearing_factors(len(forms))
+    forms = _forms(spread.places(with_soil=with_soil), with_elements=bool(elements),
+                   with_stiffer=any(stiffer))
     others = []
-    for machine, (soil, on_solved, on_stiffer), factor in zip(
-            machines, forms, factors.tolist(), strict=True):
-        own = tuple(on_soil(one, soil, block.contact) for one, block
-                    in zip(elements, model.foundations, strict=False))
-        others.append(of_other_form(machine, solved=own, stiffer=stiffer, bearings=factor,
+    for place, on_solved, on_stiffer in islice(forms, spread.samples - 1):
+        machine, solved_on = spread.machine(model, place), []
+        if case.soil is not None and with_soil:
+            soil = spread.soil(case.soil, place,
+                               highest_poisson_ratio=highest_poisson_ratio(model))
+            [machine] = on_soils(machine, [soil])
+            solved_on = [on_soil(one, soil, block.contact) for one, block
+                         in zip(elements, model.foundations, strict=False)]
+        others.append(of_other_form(machine, solved=solved_on, stiffer=stiffer,
                                     takes_solved=on_solved, takes_stiffer=on_stiffer))
-    return ResponseBand.build(table, others)
+    return ResponseBand.build(table, others, unbalance_factor=spread.unbalance_factor)
 
 
 def _forms(
-    soils: list[Soil], *, with_elements: bool, with_stiffer: bool,
-) -> Iterator[tuple[Soil, bool, bool]]:
-    """Yield soils, and whether on infinite elements and on stiffer ground: extremes first."""
-    given, softest, stiffest, *others = soils
+    places: list[dict[str, float]], *, with_elements: bool, with_stiffer: bool,
+) -> Iterator[tuple[dict[str, float], bool, bool]]:
+    """Yield places, and whether on infinite elements and on stiffer ground."""
+    alone = [place for place in places[1:] if len(place) == 1]
     ways = [(on_elements, on_stiffer) for on_stiffer in (False, True)[:1 + with_stiffer]
             for on_elements in (False, True)[:1 + with_elements]]
-    for number, way in enumerate(ways):
-        yield from ((soil, *way) for soil in (softest, stiffest, given)[:2 + bool(number)])
-    yield from ((soil, *ways[number % len(ways)]) for number, soil in enumerate(others))
+    # What one input alone does is told by the model of the case.
+    yield from ((place, *ways[0]) for place in alone)
+    for way in ways[1:]:
+        yield from ((place, *way) for place in (*alone[:2], places[0]))
+    yield from ((place, *ways[number % len(ways)])
+                for number, place in enumerate(places[1 + len(alone):]))
 
 
 def _other_forms(
@@ -213,7 +219,8 @@ def _other_forms(
 ) -> tuple[list[SoilModel], list[float]]:
     """Return what the ground below each block may be instead, and how much stiffer."""
     stiffer = [0.0] * len(case.foundations)
-    if not spread.model_form or case.soil is None or case.support.geometry != 'disc':
+    if (not spread.model_form or case.soil is None or case.support.geometry != 'disc'
+            or case.support.model not in ('cone', 'infinite_elements')):
         return [], stiffer
     stiffer = [min(mapping_error(block.contact), _LARGEST_MAPPING) for block in case.foundations]
     if case.support.model != 'cone':

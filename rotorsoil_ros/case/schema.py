@@ -286,13 +286,20 @@ class UnbalanceEntry(Entry):
 
 
 class Uncertainty(Entry):
-    """How far the soil may be from what the file says."""
+    """How far the machine and its soil may be from what the file says."""
 
     shear_modulus_factor: Ratio | None = None
     poisson_ratio: Ratio | None = None
     loss_factor: Ratio | None = None
     samples: Count | None = None
+    soil_density_factor: Ratio | None = None
     bearing_stiffness_factor: Ratio | None = None
+    bearing_damping_factor: Ratio | None = None
+    pedestal_stiffness_factor: Ratio | None = None
+    foundation_mass_factor: Ratio | None = None
+    rotor_mass_factor: Ratio | None = None
+    shaft_stiffness_factor: Ratio | None = None
+    unbalance_factor: Ratio | None = None
     model_form: StrictBool | None = None
 
 

@@ -36,6 +36,15 @@ _LARGEST_POISSON_RATIO = 0.45
 _SURVIVED = 0.05
 
 
+# Of what the edges of a band hold besides the soil: in the words of an engineer.
+_UNCERTAIN = {
+    'soil_density_factor': 'density of the soil', 'bearing_stiffness_factor': 'bearing stiffness',
+    'bearing_damping_factor': 'bearing damping', 'pedestal_stiffness_factor': 'pedestals',
+    'foundation_mass_factor': 'mass of the foundation', 'rotor_mass_factor': 'mass of the discs',
+    'shaft_stiffness_factor': 'stiffness of the shaft', 'unbalance_factor': 'unbalance',
+}
+
+
 def derived_quantities(
     case: Case, soil_models: Sequence[SoilModel],
 ) -> Iterator[tuple[str, str]]:
@@ -102,13 +111,14 @@ def model_error(case: Case, foundation: Foundation) -> str:
 
 def band_contents(case: Case) -> str:
     """Return what the edges of the band of a case hold; empty if it has none."""
-    if case.soil is None or case.support.model not in ('cone', 'infinite_elements'):
-        return ''
-    spread = case.uncertainty
-    parts = [f'soil (G within a factor {spread.shear_modulus_factor:g}, nu within '
-             f'{spread.poisson_ratio:g}, eta within {spread.loss_factor:g})']
-    if spread.bearing_stiffness_factor > 1.0:
-        parts.append(f'bearings (stiffness within a factor {spread.bearing_stiffness_factor:g})')
+    spread, knows_soil = case.uncertainty, (
+        case.soil is not None and case.support.model in ('cone', 'infinite_elements'))
+    parts = [f'{what} (within a factor {getattr(spread, name):g})' for name, what
+             in _UNCERTAIN.items() if name in spread.inputs(with_soil=knows_soil)]
+    if case.soil is None or not knows_soil:
+        return '; '.join(parts)
+    parts.insert(0, f'soil (G within a factor {spread.shear_modulus_factor:g}, nu within '
+                    f'{spread.poisson_ratio:g}, eta within {spread.loss_factor:g})')
     if not spread.model_form or case.support.geometry != 'disc':
         return '; '.join([*parts, 'not the error of the models'])
     if case.support.model == 'cone':

@@ -1,4 +1,4 @@
-"""The band in which the response lies, as far as the soil is known."""
+"""The band in which the response lies, as far as the machine and its soil are known."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.accuracy import StifferGround
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
@@ -32,87 +31,8 @@ _EDGE_ERROR = 0.02
 _EDGE_FLOOR = 1e-5
 _EDGE_HALVINGS = 10
 
-_MOST_SAMPLES = 4096
-
 # Phases further apart than this say nothing about the phase any more [rad].
 _NO_PHASE = 0.95 * math.pi
-
-
-@dataclass(frozen=True, slots=True)
-class SoilSpread:
-    """
-    How far a soil may be from what its case file says.
-
-    Attributes
-    ----------
-    shear_modulus_factor : float
-        G lies between G / factor and G * factor, evenly in its logarithm [-].
-    poisson_ratio, loss_factor : float
-        Half-widths of the ranges of nu and eta [-], cut where they would leave the possible.
-    samples : int
-        Number of soils, at least 3: the given one and both extremes of G are among them.
-    bearing_stiffness_factor : float
-        The stiffness of all bearings lies between that of the case over and times this, evenly
-        in its logarithm [-].
-    model_form : bool
-        Whether the error of the models of the ground themselves is part of the band.
-
-    References
-    ----------
-    ASCE 4, sec. on soil-structure interaction: G (1 + C_v) and G / (1 + C_v), C_v = 0.5 to 1.
-
-    """
-
-    shear_modulus_factor: float = 2.0
-    poisson_ratio: float = 0.05
-    loss_factor: float = 0.03
-    samples: int = 64
-    bearing_stiffness_factor: float = 1.0
-    model_form: bool = True
-
-    def __post_init__(self) -> None:
-        require(1.0 <= self.shear_modulus_factor < math.inf, 'shear_modulus_factor',
-                '>= 1 and finite', self.shear_modulus_factor)
-        require(0.0 <= self.poisson_ratio < 0.5, 'poisson_ratio', 'in [0, 0.5)',
-                self.poisson_ratio)
-        require(0.0 <= self.loss_factor < 1.0, 'loss_factor', 'in [0, 1)', self.loss_factor)
-        require(3 <= self.samples <= _MOST_SAMPLES, 'samples',
-                'at least 3' if self.samples < 3 else f'at most {_MOST_SAMPLES}', self.samples)
-        require(1.0 <= self.bearing_stiffness_factor < math.inf, 'bearing_stiffness_factor',
-                '>= 1 and finite', self.bearing_stiffness_factor)
-
-    def soils(self, soil: Soil, *, highest_poisson_ratio: float = 0.49) -> list[Soil]:
-        """
-        Return the soils to be tried, the given one first and the same in every process.
-
-        Parameters
-        ----------
-        soil : Soil
-            Middle of the spread.
-        highest_poisson_ratio : float
-            Up to which the support model holds.
-
-        """
-        from scipy.stats import qmc  # takes a quarter of a second to import
-
-        factor = self.shear_modulus_factor
-        extremes = [Soil(soil.shear_modulus * end, soil.poisson_ratio, soil.density,
-                         soil.loss_factor) for end in (1.0, 1.0 / factor, factor)]
-        cube = qmc.LatinHypercube(3, seed=0).random(self.samples - len(extremes))
-        modulus = soil.shear_modulus * factor ** (2.0 * cube[:, 0] - 1.0)
-        poisson = soil.poisson_ratio + self.poisson_ratio * (2.0 * cube[:, 1] - 1.0)
-        poisson = np.clip(poisson, 0.0, max(soil.poisson_ratio, highest_poisson_ratio))
-        loss = np.maximum(0.0, soil.loss_factor + self.loss_factor * (2.0 * cube[:, 2] - 1.0))
-        return extremes + [Soil(g, nu, soil.density, eta) for g, nu, eta in zip(
-            modulus.tolist(), poisson.tolist(), loss.tolist(), strict=True)]
-
-    def bearing_factors(self, count: int) -> FloatArray:
-        """Return by what the bearings' stiffness is multiplied in each of so many machines."""
-        # Golden-ratio steps are even in every part of the sequence, and both ends come first.
-        share = np.mod(0.5 + np.arange(count) * (5.0**0.5 - 1.0) / 2.0, 1.0)
-        share[1:3] = (0.0, 1.0)[:max(0, min(2, count - 1))]
-        share[:1] = 0.5
-        return np.asarray(self.bearing_stiffness_factor ** (2.0 * share - 1.0))
 
 
 @dataclass(frozen=True)
@@ -189,21 +109,37 @@ class Envelope:
 
 @dataclass(frozen=True)
 class ResponseBand:
-    """Response tables of a machine on each of its possible soils, the given one first."""
+    """
+    Response tables of all machines that a machine may be, the given one first.
+
+    Attributes
+    ----------
+    tables : tuple of ResponseTable
+        Of each.
+    unbalance_factor : float
+        Within which the unbalance is known [-]: it scales both edges.
+
+    """
 
     tables: tuple[ResponseTable, ...]
+    unbalance_factor: float = 1.0
 
     @classmethod
-    def build(cls, table: ResponseTable, models: Iterable[CoupledModel]) -> 'ResponseBand':
+    def build(
+        cls, table: ResponseTable, models: Iterable[CoupledModel], *,
+        unbalance_factor: float = 1.0,
+    ) -> 'ResponseBand':
         """
-        Solve a machine on other soils.
+        Solve the other machines.
 
         Parameters
         ----------
         table : ResponseTable
-            Of the given soil; it tells where speeds have to be close.
+            Of the given machine; it tells where speeds have to be close.
         models : iterable of CoupledModel
-            The machine on the other soils.
+            What it may be instead.
+        unbalance_factor : float
+            Within which the unbalance is known [-].
 
         """
         edges = table.pieces.edges
@@ -212,7 +148,7 @@ class ResponseBand:
             table.channels, table.planes, table.transmits_force,
             refine(_solver(model), edges, groups=model.groups, tolerance=_TOLERANCE,
                    columns=len(model.planes)), _TOLERANCE,
-            table.stability) for model in models)))
+            table.stability) for model in models)), unbalance_factor)
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:
         """
@@ -233,7 +169,8 @@ class ResponseBand:
             if not missed.any():
                 break
             found, fresh = _inserted(found, exact, left, missed)
-        return found
+        return replace(found, low=found.low / self.unbalance_factor,
+                       high=found.high * self.unbalance_factor)
 
 
 def _extremes(predictors: Sequence[Predictor], speed: FloatArray) -> Envelope:
@@ -306,10 +243,10 @@ def on_soils(model: CoupledModel, soils: Sequence[Soil]) -> list[CoupledModel]:
 
 def of_other_form(
     model: CoupledModel, *, solved: Sequence[SoilModel], stiffer: Sequence[float],
-    bearings: float, takes_solved: bool, takes_stiffer: bool,
+    takes_solved: bool, takes_stiffer: bool,
 ) -> CoupledModel:
     """
-    Return a machine whose models of the ground and of the bearings are others.
+    Return a machine whose models of the ground are others.
 
     Parameters
     ----------
@@ -319,8 +256,6 @@ def of_other_form(
         What may stand in place of the model below each block; empty if there is none.
     stiffer : sequence of float
         Share by which each contact may be stiffer than its disc.
-    bearings : float
-        Factor of the stiffness of all bearings.
     takes_solved, takes_stiffer : bool
         Whether either is taken.
 
@@ -329,10 +264,7 @@ def of_other_form(
     if takes_stiffer:
         soils = tuple(StifferGround(soil, share) if share else soil
                       for soil, share in zip(soils, stiffer, strict=True))
-    rotor = model.rotor
-    if bearings != 1.0:
-        rotor = replace(rotor, bearings=tuple(one.stiffer(bearings) for one in rotor.bearings))
-    return replace(model, rotor=rotor, soil_models=soils)
+    return replace(model, soil_models=soils)
 
 
 def highest_poisson_ratio(model: CoupledModel) -> float:

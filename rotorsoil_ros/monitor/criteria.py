@@ -16,10 +16,11 @@ from rotorsoil_ros.case.summary import clipped, unstable
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN
 from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.errors import NotSolvedError
-from rotorsoil_ros.machine.band import Envelope, ResponseBand, SoilSpread
+from rotorsoil_ros.machine.band import Envelope, ResponseBand
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
+from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.monitor.quasistatic import Resonance
 
 # Critical speeds are looked for between these multiples of the highest speed.

@@ -139,12 +139,10 @@ class Bearing:
         """Mean direct stiffness over its directions and speeds [N/m]."""
         return float(np.abs(np.diagonal(_values(self.stiffness), axis1=-2, axis2=-1)).mean())
 
-    def stiffer(self, factor: float) -> 'Bearing':
-        """Return the same bearing with its stiffness times a factor."""
-        own = self.stiffness
-        scaled = (SpeedTable(own.speed, factor * own.values) if isinstance(own, SpeedTable)
-                  else factor * own)
-        return replace(self, stiffness=scaled)
+    def scaled(self, *, stiffness: float = 1.0, damping: float = 1.0) -> 'Bearing':
+        """Return the same bearing with its stiffness and its damping times a factor each."""
+        return replace(self, stiffness=_times(stiffness, self.stiffness),
+                       damping=_times(damping, self.damping))
 
     def coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
@@ -182,6 +180,12 @@ class Bearing:
         """Return K(speed) + i omega C(speed), (n, 2, 2) over (x, z) [N/m]."""
         stiffness, damping = self.coefficients(speed)
         return np.asarray(stiffness + 1j * omega[:, None, None] * damping)
+
+
+def _times(factor: float, matrix: FloatArray | SpeedTable) -> FloatArray | SpeedTable:
+    if isinstance(matrix, SpeedTable):
+        return SpeedTable(matrix.speed, factor * matrix.values)
+    return factor * matrix
 
 
 def _values(matrix: FloatArray | SpeedTable) -> FloatArray:

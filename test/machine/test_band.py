@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Soil
-from rotorsoil_ros.machine.band import Envelope, of_other_form, ResponseBand, SoilSpread
+from rotorsoil_ros.machine.band import Envelope, of_other_form, ResponseBand
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.spread import SoilSpread
 
 from machines import CONTACT, paper_machine, SOIL
 
@@ -18,10 +18,15 @@ RANGE = (60.0, 900.0)
 SPREAD = SoilSpread(samples=12)
 
 
+def soils_of(spread, soil=SOIL):
+    """Return all soils of a spread."""
+    return [spread.soil(soil, place) for place in spread.places(with_soil=True)]
+
+
 @pytest.fixture(scope='module')
 def models():
     """Return the paper's machine on twelve soils, the given one first."""
-    return [paper_machine(ConeModel(soil, CONTACT)) for soil in SPREAD.soils(SOIL)]
+    return [paper_machine(ConeModel(soil, CONTACT)) for soil in soils_of(SPREAD)]
 
 
 @pytest.fixture(scope='module')
@@ -65,7 +70,7 @@ def sharp_machine(soil=SOIL):
 
 def test_prediction_lies_in_its_own_band_everywhere():
     table = ResponseTable.build(sharp_machine(), RANGE)
-    others = [sharp_machine(soil) for soil in SoilSpread(samples=5).soils(SOIL)[1:]]
+    others = [sharp_machine(soil) for soil in soils_of(SoilSpread(samples=5))[1:]]
     found = ResponseBand.build(table, others).envelope(UNBALANCE)
     speed = np.sort(np.random.default_rng(3).uniform(*RANGE, 20_000))
     nominal = table.predictor(UNBALANCE).predict(speed).displacement
@@ -81,7 +86,7 @@ def test_prediction_lies_in_its_own_band_everywhere():
 
 def test_edges_follow_an_antiresonance_between_the_first_speeds():
     table = ResponseTable.build(sharp_machine(), RANGE)
-    others = [sharp_machine(soil) for soil in SoilSpread(samples=5).soils(SOIL)[1:]]
+    others = [sharp_machine(soil) for soil in soils_of(SoilSpread(samples=5))[1:]]
     found = ResponseBand.build(table, others).envelope(UNBALANCE)
     speed = np.sort(np.random.default_rng(5).uniform(*RANGE, 4000))
     exact = np.abs([model.unbalance_response(speed, UNBALANCE).displacement
@@ -94,33 +99,30 @@ def test_edges_follow_an_antiresonance_between_the_first_speeds():
     assert np.mean(np.abs(band.high[:, moving] - high) > 0.05 * high) < 0.01
 
 
-def test_bearings_spread_evenly_over_their_factor():
-    factors = SoilSpread(bearing_stiffness_factor=3.0).bearing_factors(64)
-    assert (factors.min(), factors.max()) == (1.0 / 3.0, 3.0)
-    assert factors[0] == 1.0
-    assert np.median(factors) == pytest.approx(1.0, rel=0.1)
-    assert set(SoilSpread().bearing_factors(9)) == {1.0}
-
-
-def test_other_forms_change_ground_and_bearings_only():
+def test_other_forms_change_the_ground_only():
     model, soft = paper_machine(), ConeModel(Soil(1e6, 0.2, 1800.0), CONTACT)
-    same = of_other_form(model, solved=[soft], stiffer=[0.2], bearings=1.0, takes_solved=False,
+    same = of_other_form(model, solved=[soft], stiffer=[0.2], takes_solved=False,
                          takes_stiffer=False)
     assert same == model
-    other = of_other_form(model, solved=[soft], stiffer=[0.2], bearings=2.0, takes_solved=True,
+    other = of_other_form(model, solved=[soft], stiffer=[0.2], takes_solved=True,
                           takes_stiffer=True)
     omega = np.array([100.0])
     np.testing.assert_allclose(other.soil_models[0].compliance(omega),
                                soft.compliance(omega) / 1.2, rtol=1e-15)
-    for one, two in zip(model.rotor.bearings, other.rotor.bearings, strict=True):
-        np.testing.assert_array_equal(2.0 * one.stiffness, two.stiffness)
-        np.testing.assert_array_equal(one.damping, two.damping)
+    assert other.rotor == model.rotor
+
+
+def test_unbalance_that_is_not_known_scales_both_edges(models, envelope):
+    table = ResponseTable.build(models[0], RANGE)
+    found = ResponseBand.build(table, models[1:], unbalance_factor=2.5).envelope(UNBALANCE)
+    np.testing.assert_array_equal(found.low, envelope.low / 2.5)
+    np.testing.assert_array_equal(found.high, envelope.high * 2.5)
 
 
 def test_soil_matters_near_the_resonance_and_not_far_above_it():
     # A mass on a spring: below 1.5 f_n the band matters, above 3 f_n mass decides.
     soft = [paper_machine(ConeModel(soil, CONTACT), mass=2000.0)
-            for soil in SoilSpread(samples=5).soils(SOIL)]
+            for soil in soils_of(SoilSpread(samples=5))]
     block = soft[0].channels.index('block_z')
     speed = np.array([300.0, 2500.0])
     size = np.array([np.abs(model.unbalance_response(speed, UNBALANCE).displacement[:, block])
@@ -135,32 +137,6 @@ def test_outside_its_speeds_there_is_no_band(envelope):
     assert np.isnan(found.high[:3]).all()
     assert np.isfinite(found.high[3]).all()
     assert not found.holds(np.zeros((4, 18), dtype=complex))[:3].any()
-
-
-def test_spread_holds_the_given_soil_and_both_extremes():
-    soils = SPREAD.soils(SOIL)
-    assert len(soils) == 12
-    assert soils[0] == SOIL
-    modulus = np.array([soil.shear_modulus for soil in soils]) / SOIL.shear_modulus
-    assert (modulus.min(), modulus.max()) == (0.5, 2.0)
-    assert soils == SPREAD.soils(SOIL)
-    assert {soil.density for soil in soils} == {SOIL.density}
-    assert max(abs(soil.poisson_ratio - 0.25) for soil in soils) <= 0.05
-    assert max(abs(soil.loss_factor - 0.10) for soil in soils) <= 0.03
-
-
-@pytest.mark.parametrize('change, rule', [
-    ({'shear_modulus_factor': 0.5}, 'shear_modulus_factor must be >= 1 and finite, got 0.5'),
-    ({'poisson_ratio': math.nan}, r'poisson_ratio must be in \[0, 0.5\)'),
-    ({'loss_factor': -0.1}, r'loss_factor must be in \[0, 1\)'),
-    ({'samples': 2}, 'samples must be at least 3, got 2'),
-    ({'samples': 10**9}, 'samples must be at most 4096'),
-    ({'bearing_stiffness_factor': 0.5}, 'bearing_stiffness_factor must be >= 1 and finite')])
-def test_impossible_spread_is_refused(change, rule):
-    with pytest.raises(RotorSoilError, match=rule):
-        SoilSpread(**change)
-
-
 
 
 def test_envelope_at_one_speed_has_the_bits_of_many():

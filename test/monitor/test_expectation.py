@@ -16,7 +16,7 @@ from rotorsoil_ros.case.models import (
     response_table,
 )
 from rotorsoil_ros.ground.elements import tabulate as elements_tabulate
-from rotorsoil_ros.machine.band import SoilSpread
+from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.monitor.criteria import answer, Expectation
 from rotorsoil_ros.units import rad_s_to_rpm
 

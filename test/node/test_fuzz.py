@@ -21,7 +21,7 @@ from rotorsoil_ros.bags.recover import recover
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP, Measured, Predicted, Samples
-from rotorsoil_ros.machine.band import SoilSpread
+from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.wire.cdr import JointStateReader
