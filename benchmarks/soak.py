@@ -28,8 +28,9 @@ from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
-from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, ROTOR_JOINT
+from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS
 from rotorsoil_ros.wire.messages import Encoder, Messenger, pack_stamp, Topics
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 RATE_HZ = 100
@@ -88,10 +89,10 @@ class Plant:
             monitor.begin(START_NS, machine.description(name, machine.case.unbalance))
             self.monitors.append(monitor)
             self.inlets.append(inlet('joint_states', f'/{name}/joint_states', monitor,
-                                     rotor_joint=ROTOR_JOINT, log=self.log.write))
+                                     log=self.log.write))
             self._measured.append([
-                inlet(kind, f'/{name}/{kind}', monitor, rotor_joint=ROTOR_JOINT,
-                      log=self.log.write) for kind in MEASURED_TOPICS])
+                inlet(kind, f'/{name}/{kind}', monitor, log=self.log.write)
+                for kind in MEASURED_TOPICS])
 
     def measure(self, step: int) -> None:
         """Tell one machine a vector of one of its housings."""

@@ -22,8 +22,9 @@ import rotorsoil_ros
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor
-from rotorsoil_ros.wire.handlers import inlet, MEASURED_TOPICS, ROTOR_JOINT
+from rotorsoil_ros.wire.handlers import inlet, MEASURED_TOPICS
 from rotorsoil_ros.wire.messages import Encoder, JointStateWriter, Messenger, Records, Topics
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT
 
 PACKAGE = Path(rotorsoil_ros.__file__).parent
 CASE = PACKAGE.parent / 'config' / 'plant_fan.yaml'
@@ -61,7 +62,7 @@ class Plant:
         self.monitor.judge.take_criteria(criteria(
             machine.case, machine.model, machine.case.unbalance, directory))
         self.monitor.begin(START_NS, machine.description('fan', machine.case.unbalance))
-        self._inlets = {name: inlet(name, f'/fan/{name}', self.monitor, rotor_joint=ROTOR_JOINT,
+        self._inlets = {name: inlet(name, f'/fan/{name}', self.monitor,
                                     log=lambda records: None)
                         for name in ('joint_states', *MEASURED_TOPICS)}
 

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
     from rotorsoil_ros.rotor.disc import Disc
     from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
+    from rotorsoil_ros.wire.speeds import SpeedSource
 
 __version__ = '0.1.0'
 __all__ = [
@@ -55,7 +56,7 @@ __all__ = [
     'InputError', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'OutOfTableError',
     'Pedestal', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response',
     'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel',
-    'SoilSpread', 'Verdict', 'Wish', 'compare', 'load', 'read_profile',
+    'SoilSpread', 'SpeedSource', 'Verdict', 'Wish', 'compare', 'load', 'read_profile',
 ]
 
 # Which room a public name lives in.
@@ -84,6 +85,7 @@ _ROOMS = {
     'rotor.bearing': ('Bearing', 'Pedestal'),
     'rotor.disc': ('Disc',),
     'rotor.shaft': ('Material', 'Probe', 'ShaftSection'),
+    'wire.speeds': ('SpeedSource',),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -7,9 +7,11 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.profile import read_profile
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.node.replay import replay
+from rotorsoil_ros.wire.speeds import SpeedSource
 
 from records import topics_of
 
@@ -21,10 +23,10 @@ YEAR_NS = 365 * 86400 * 10**9
 @pytest.fixture
 def predicted(tmp_path, case_file, cache, machine, capsys):
     """Return what predicts a log of a case: its status, what it says, and when it answered."""
-    def run(log):
+    def run(log, *options):
         out = tmp_path / 'out.mcap'
         status = main(['predict', str(case_file), str(log), '-o', str(out),
-                       '--cache', str(cache)])
+                       '--cache', str(cache), *options])
         times = [] if not out.exists() else [time for _, time, _ in bag_reader.messages(
             out, lambda topic, _: topic == ANSWERS)]
         assert list(tmp_path.glob('*.partial')) == []
@@ -77,6 +79,58 @@ def test_what_cannot_be_read_is_refused_by_its_topic_and_nothing_is_sent(predict
 def test_nothing_answered_is_a_failure_with_its_reason(predicted, log, words):
     status, said, times = predicted(CASES / 'joint_of_another_name' / f'{log}.mcap')
     assert (status, times) == (1, [])
+    assert words in said.err
+
+
+NAMED = '--speed-topic'
+SPEEDS = [
+    ('speed_in_another_type/float32.mcap', 200, [NAMED, '/paper_rotor/rotor/speed']),
+    ('speed_in_another_type/rpm_int32.mcap', 200,
+     [NAMED, '/paper_rotor/rpm', '--speed-unit', 'rpm']),
+    ('speed_in_another_type/twist.mcap', 200, ['--speed-field', 'twist.angular.y']),
+    ('joint_of_another_name/othername.mcap', 200, ['--joint', 'fan_motor_joint']),
+    ('joint_of_another_name/reversed.mcap', 200, ['--speed-ratio', '-1']),
+    ('two_types_on_one_topic/a.mcap', 100, [NAMED, '/paper_rotor/joint_states']),
+    ('two_types_on_one_topic/b.mcap', 100, [NAMED, 'paper_rotor/joint_states']),
+    ('two_types_on_one_topic/b.mcap', 100, [
+        NAMED, '/paper_rotor/joint_states', '--speed-type', 'drive_msgs/msg/MotorState',
+        '--speed-unit', 'rpm'])]
+
+
+@pytest.mark.parametrize('log, answered, options', SPEEDS)
+def test_a_speed_is_read_where_and_as_the_plant_tells_it(predicted, log, answered, options):
+    status, said, times = predicted(CASES / log, *options)
+    assert (status, len(times), said.err) == (0, answered, '')
+
+
+@pytest.mark.parametrize('log, answered, options', SPEEDS)
+def test_a_log_tells_such_a_speed_as_it_was_understood(
+        predicted, tmp_path, log, answered, options):
+    predicted(CASES / log, *options)
+    understood = read_profile(tmp_path / 'out.mcap')
+    assert (understood.machine, len(understood.speed)) == ('paper_rotor', answered)
+    source = SpeedSource(**{
+        name.removeprefix('--').removeprefix('speed-'): float(value) if 'ratio' in name else value
+        for name, value in zip(options[::2], options[1::2], strict=True)})
+    assert understood.speed.tolist() == read_profile(
+        CASES / log, machine='paper_rotor' if source.topic else None,
+        speed=source).speed.tolist()
+    assert 0.0 < understood.speed.min() < understood.speed.max() < 1000.0
+
+
+@pytest.mark.parametrize('log, options, words', [
+    ('speed_in_another_type/rpm_int32.mcap', [], 'numbers are on /paper_rotor/rpm (std_msgs/'),
+    ('speed_in_another_type/rpm_int32.mcap', [NAMED, '/paper_rotor/rpms'],
+     'no such topic; did you mean /paper_rotor/rpm?'),
+    ('speed_in_another_type/twist.mcap', ['--speed-field', 'twist.angular.q'],
+     'has no number twist.angular.q; its numbers are twist.linear.x'),
+    ('speed_in_another_type/twist.mcap', [NAMED, '/paper_rotor/rotor/speed'],
+     'the field of the speed must be named'),
+    ('two_types_on_one_topic/b.mcap', ['--speed-ratio', '0'], 'speed ratio must be finite'),
+    ('other_encodings/json.mcap', [NAMED, '/paper_rotor/joint_states'], 'is encoded as json')])
+def test_a_speed_that_is_not_told_so_is_refused_in_one_line(predicted, log, options, words):
+    status, said, times = predicted(CASES / log, *options)
+    assert (status, times, said.err.count('\n')) == (2, [], 1)
     assert words in said.err
 
 

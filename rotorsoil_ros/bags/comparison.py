@@ -20,7 +20,7 @@ from rotorsoil_ros.monitor.health import REDATED
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.points import Collector
 from rotorsoil_ros.monitor.rules import Judging, Matching, Rules
-from rotorsoil_ros.wire.handlers import ROTOR_JOINT
+from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
 
 Progress = Callable[[int, int], None]
 Descriptions = Sequence[tuple[int, Mapping[str, Any]]]
@@ -33,8 +33,10 @@ class Wish:
 
     Attributes
     ----------
-    machine, rotor_joint : str
-        Which machine of the log (empty: the only one), and the joint that tells its speed.
+    machine : str
+        Which machine of the log (empty: the only one).
+    speed : SpeedSource
+        What tells its speed.
     matching : Matching
         How points are matched and cleaned.
     amplitude_margin : float
@@ -49,7 +51,7 @@ class Wish:
     """
 
     machine: str = ''
-    rotor_joint: str = ROTOR_JOINT
+    speed: SpeedSource = USUAL
     matching: Matching = field(default_factory=Matching)
     amplitude_margin: float = Rules().amplitude_margin
     zones: ZoneLimits | None = None
@@ -85,7 +87,7 @@ def compare(
 
     """
     wish, log = wish or Wish(), Path(log)
-    inputs = Inputs.of(log, machine=wish.machine)
+    inputs = Inputs.of(log, machine=wish.machine, speed=wish.speed)
     if not inputs.is_measured:
         raise InputError(f'{log}: {inputs.machine}: nothing measured in the log (topics '
                          f'{inputs.machine}/measured/...)')
@@ -135,8 +137,7 @@ class _Reading:
                 monitor.judge.take_criteria(expectation.criteria(unbalance))
 
         done = 0
-        for number in feed(self.inputs, monitor, {}, rotor_joint=self.wish.rotor_joint,
-                           on_description=take):
+        for number in feed(self.inputs, monitor, {}, on_description=take):
             done += number
             if self.progress:
                 self.progress(done, self.inputs.number)

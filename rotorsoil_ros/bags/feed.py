@@ -1,6 +1,6 @@
 """How does a recorded run reach a monitor? Message by message, ticking at its own full seconds."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import math
@@ -9,10 +9,11 @@ from typing import Any
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import (
+    ADVICE,
+    candidates,
+    Input,
     inputs as inputs_among,
-    is_input,
     near_misses,
-    Place,
     SPEEDS_AT_ONCE,
 )
 from rotorsoil_ros.errors import InputError
@@ -20,8 +21,9 @@ from rotorsoil_ros.events import LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.wire.cdr import Cursor
 from rotorsoil_ros.wire.definitions import STRING
-from rotorsoil_ros.wire.handlers import Inlet, inlet, Outlet, ROTOR_JOINT, SPEED_TOPICS
+from rotorsoil_ros.wire.handlers import Inlet, inlet, Outlet
 from rotorsoil_ros.wire.messages import Records
+from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
 
 AT_ONCE = 128  # speeds that may be told before measurements of the same time find them
 
@@ -39,8 +41,10 @@ class Inputs:
         Bag directory or MCAP file.
     namespace, machine : str
         Of its topics.
-    topics : mapping of str to (Place, int)
-        Place of every input, and how many messages it has.
+    topics : mapping of str to Input
+        What is told of it.
+    speed : SpeedSource
+        What in its speed topics is the speed.
     models : tuple of str
         Topics on which a node told what its predictions rest on.
     remarks : dict of str
@@ -51,12 +55,15 @@ class Inputs:
     bag: Path
     namespace: str
     machine: str
-    topics: Mapping[str, tuple[Place, int]]
+    topics: Mapping[str, Input]
+    speed: SpeedSource
     models: tuple[str, ...]
     remarks: dict[str, None]
 
     @classmethod
-    def of(cls, bag: Path, *, machine: str = '', like: str = '') -> 'Inputs':
+    def of(
+        cls, bag: Path, *, machine: str = '', like: str = '', speed: SpeedSource = USUAL,
+    ) -> 'Inputs':
         """
         Return the inputs of a machine.
 
@@ -68,6 +75,8 @@ class Inputs:
             Its name; empty: the only one.
         like : str
             Name to choose where the bag tells of several machines and none is named.
+        speed : SpeedSource
+            What tells its speed.
 
         Raises
         ------
@@ -77,21 +86,15 @@ class Inputs:
         """
         remarks = dict[str, None]()
         sources = bag_reader.sources(bag, tell=remarks.setdefault)
-        found, missed = inputs_among(sources), near_misses(sources)
-        speaking = {(where.namespace, where.machine) for where, number in found.values()
-                    if where.name in SPEED_TOPICS and number}
-        wanted = machine or (like if len(speaking) > 1 else '')
-        chosen = {each for each in speaking if wanted in ('', each[1])}
-        if len(chosen) != 1:
-            speeds = ', '.join([*(topic for topic, (where, _) in found.items()
-                                  if where.name in SPEED_TOPICS), *missed]) or 'none'
-            needed = machine or (f'one machine, or one called {like}' if like else 'one machine')
-            raise InputError(f'{bag}: must tell the speed of {needed} on joint_states or '
-                             f'rotor/speed; speed topics: {speeds}')
-        [(namespace, name)] = chosen
+        try:
+            found, missed = inputs_among(sources, speed), near_misses(sources, speed)
+        except InputError as error:
+            raise InputError(f'{bag}: {error}') from error
+        namespace, name = _chosen(bag, found, machine, like, missed, candidates(sources))
         return cls(bag, namespace, name, {
-            topic: (where, number) for topic, (where, number) in found.items()
-            if (where.namespace, where.machine) == (namespace, name)},
+            topic: each for topic, each in found.items()
+            if (each.place.namespace, each.place.machine) == (namespace, name)
+            or _is_nobodys(each)}, speed,
             tuple(source.topic for source in sources
                   if is_model(source.topic, source.type)
                   and source.topic.endswith(f'/{name}/model')),
@@ -100,13 +103,29 @@ class Inputs:
     @property
     def number(self) -> int:
         """Number of messages."""
-        return sum(number for _, number in self.topics.values())
+        return sum(each.number for each in self.topics.values())
 
     @property
     def is_measured(self) -> bool:
         """Whether anything but speeds is told."""
-        return any(number and where.name not in SPEED_TOPICS
-                   for where, number in self.topics.values())
+        return any(each.number and not each.tells_speed for each in self.topics.values())
+
+    def is_wanted(self, topic: str, message_type: str) -> bool:
+        """Return whether messages of a type on a topic are an input of the machine."""
+        return topic in self.topics and self.topics[topic].source.type == message_type
+
+    @property
+    def spoken(self) -> str:
+        """Topic under which speeds that are told in another way are told again."""
+        return f'{self.namespace}/{self.machine}/joint_states'
+
+    def inlets(self, monitor: Monitor, log: Outlet) -> dict[str, Inlet]:
+        """Return what takes in the messages of each topic."""
+        return {topic: inlet(
+            each.place.name,
+            topic if self.speed.is_usual or not each.tells_speed else self.spoken, monitor,
+            log=log, speed=self.speed, message_type=each.source.type,
+            told=each.source.definition) for topic, each in self.topics.items()}
 
     def descriptions(self) -> list[tuple[int, Mapping[str, Any]]]:
         """Return what a node told of its model, with the time when; what is malformed is not."""
@@ -119,10 +138,36 @@ class Inputs:
         return found
 
 
+def _chosen(
+    bag: Path, found: Mapping[str, Input], machine: str, like: str, missed: Sequence[str],
+    others: str,
+) -> tuple[str, str]:
+    """Return namespace and name of the machine that is meant."""
+    told = [each for each in found.values() if each.tells_speed and each.number]
+    speaking = {(each.place.namespace, each.place.machine) for each in told}
+    if any(map(_is_nobodys, told)):  # such a speed is of whom the measurements are, or is asked
+        speaking = {(each.place.namespace, each.place.machine) for each in found.values()
+                    if not each.tells_speed and each.number} or {('', machine or like)}
+    wanted = machine or (like if len(speaking) > 1 else '')
+    chosen = {each for each in speaking if wanted in ('', each[1])}
+    if len(chosen) == 1:
+        return chosen.pop()
+    speeds = ', '.join([*(topic for topic, each in found.items() if each.tells_speed),
+                        *missed]) or 'none'
+    needed = machine or (f'one machine, or one called {like}' if like else 'one machine')
+    raise InputError(f'{bag}: must tell the speed of {needed} on joint_states or '
+                     f'rotor/speed; speed topics: {speeds}{others}'
+                     + (ADVICE if missed or others else ''))
+
+
+def _is_nobodys(each: Input) -> bool:
+    """Return whether a speed was named by its topic, which tells no machine."""
+    return each.tells_speed and not each.place.machine
+
+
 def feed(
     inputs: Inputs, monitor: Monitor, description: Mapping[str, object], *,
-    log: Outlet = lambda records: None, rotor_joint: str = ROTOR_JOINT,
-    on_description: Described | None = None,
+    log: Outlet = lambda records: None, on_description: Described | None = None,
 ) -> Iterator[int]:
     """
     Hand a run to a monitor, from its first message to its end; yield how many are done.
@@ -136,16 +181,12 @@ def feed(
     description : mapping
         What its predictions rest on.
     log : callable
-        Where accepted messages are written, byte for byte.
-    rotor_joint : str
-        Joint whose velocity is the rotor speed.
+        Where accepted messages are written.
     on_description : callable
         Takes what a node told of its model when the run was recorded, at its place in time.
 
     """
-    inlets: dict[str, Inlet] = {
-        topic: inlet(where.name, topic, monitor, rotor_joint=rotor_joint, log=log)
-        for topic, (where, _) in inputs.topics.items()}
+    inlets = inputs.inlets(monitor, log)
     models = inputs.models if on_description is not None else ()
     # Where more is told than speeds, what belongs together has to come together.
     at_most, span_ns = (
@@ -153,7 +194,7 @@ def feed(
     second = now_ns = None
     for batch in bag_reader.batches(
             inputs.bag, lambda topic, kind: (
-                (topic in inlets and is_input(topic, kind))
+                inputs.is_wanted(topic, kind)
                 or (topic in models and is_model(topic, kind))),
             at_most=at_most, span_ns=span_ns, tell=inputs.remarks.setdefault):
         if batch.topic in models:

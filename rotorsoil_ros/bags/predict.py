@@ -1,7 +1,7 @@
 """What would the node have answered to a recorded profile? The same numbers, without a graph."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 import os
@@ -10,16 +10,16 @@ from typing import Protocol
 
 from rotorsoil_ros.bags.feed import feed, Inputs
 from rotorsoil_ros.bags.metadata import files
-from rotorsoil_ros.bags.profile import joints
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Event
 from rotorsoil_ros.monitor.criteria import criteria
+from rotorsoil_ros.monitor.health import Health
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.rules import Judging
-from rotorsoil_ros.wire.handlers import ROTOR_JOINT
 from rotorsoil_ros.wire.messages import Encoder, Messenger, Topics
+from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ Opens = Callable[[str], AbstractContextManager[Screen]]
 
 def predict(
     machine: Machine, profile: Path, out: Path, *, screen: Opens | None = None,
-    rotor_joint: str = ROTOR_JOINT, progress: Callable[[int, int], None] | None = None,
+    speed: SpeedSource = USUAL, progress: Callable[[int, int], None] | None = None,
 ) -> Answered:
     """
     Answer every speed of a profile and log it as the node would.
@@ -77,8 +77,8 @@ def predict(
         Log to write: profile, measurements and answers.
     screen : callable
         Opens who shows the events of a machine, given its name.
-    rotor_joint : str
-        Joint whose velocity is the rotor speed.
+    speed : SpeedSource
+        What tells the speed.
     progress : callable
         Called with the number of messages read and their total.
 
@@ -93,7 +93,7 @@ def predict(
         If a file cannot be read or tells no speed, or if `out` is the profile itself.
 
     """
-    inputs = Inputs.of(profile, like=machine.case.name)
+    inputs = Inputs.of(profile, like=machine.case.name, speed=speed)
     if out.exists() and any(out.samefile(file) for file in files(profile)):
         raise InputError(f'{out}: is the profile itself')
     name = inputs.machine or machine.case.name
@@ -110,26 +110,26 @@ def predict(
             machine.case, machine.model, machine.case.unbalance, machine.directory))
         done = 0
         for number in feed(inputs, monitor, machine.description(name, machine.case.unbalance),
-                           log=log.write, rotor_joint=rotor_joint):
+                           log=log.write):
             done += number
             for sink in viewer:
                 sink.flush()
             if progress:
                 progress(done, inputs.number)
         log.close()
-        failure = _why_nothing(inputs, monitor.health.counts, rotor_joint)
+        failure = _why_nothing(monitor.health)
         if not failure:
             os.replace(partial, out)
     return Answered(name, monitor.health.counts, tuple(inputs.remarks), failure)
 
 
-def _why_nothing(inputs: Inputs, counts: Mapping[str, int], rotor_joint: str) -> str:
+def _why_nothing(health: Health) -> str:
     """Say why not one speed is answered; nothing where one is."""
-    if counts['answered']:
+    if health.counts['answered']:
         return ''
-    told = ', '.join(f'{number} {reason.replace("_", " ")}' for reason, number in counts.items()
-                     if number and reason not in ('received', 'measured', 'samples'))
-    if counts['joint_missing']:
-        there = ', '.join(joints(inputs.bag, inputs.topics))
-        told += f' (needed is {rotor_joint}, there are {there})'
+    told = ', '.join(
+        f'{number} {reason.replace("_", " ")}'
+        + (f' ({more})' if (more := health.explanations.get(reason)) else '')
+        for reason, number in health.counts.items()
+        if number and reason not in ('received', 'measured', 'samples'))
     return f'nothing is answered: {told or "no speed is told"}'

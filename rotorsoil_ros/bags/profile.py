@@ -1,9 +1,9 @@
 """What did the speed of a machine do? Profiles in bags: found, read, written, measured."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import csv
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +15,15 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS, Profile
 from rotorsoil_ros.units import rpm_to_rad_s, SECONDS_PER_MINUTE
-from rotorsoil_ros.wire.cdr import ARRAYS, Layout
-from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
-from rotorsoil_ros.wire.handlers import raw_channel, ROTOR_JOINT, SPEED_TOPICS, SpeedReader, TOPICS
-from rotorsoil_ros.wire.messages import JointStateWriter, Records
+from rotorsoil_ros.wire.cdr import ARRAYS
+from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
+from rotorsoil_ros.wire.handlers import raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.messages import JointStateWriter, OWN_TOPICS, Records
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USUAL
 
 SPEEDS_AT_ONCE = 1024
-IMU_NAME = 'measured/<channel>/imu'
+MOST_TOLD = 8
+ADVICE = '; another number is read if its topic, field and unit are named (--speed-topic)'
 MICROMETRE = 1e-6
 
 
@@ -35,6 +37,20 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
+class Input:
+    """An input of a machine in a bag: where it stands, its channel, and its messages' number."""
+
+    place: Place
+    source: Source
+    number: int
+
+    @property
+    def tells_speed(self) -> bool:
+        """Whether it tells a speed, not a measurement."""
+        return self.place.name in SPEED_TOPICS
+
+
+@dataclass(frozen=True, slots=True)
 class SpeedBatch:
     """Successive speeds of one topic: stamps (n,) [ns] and speeds (n,) [rad/s]."""
 
@@ -45,79 +61,132 @@ class SpeedBatch:
 
 def place(topic: str, message_type: str) -> Place | None:
     """Return where an input of a machine stands; None for every other topic."""
-    endings = [name for name, wanted in TOPICS.items() if message_type == wanted]
-    if message_type == IMU:
-        endings = ['/'.join(topic.split('/')[-3:])]
-        endings = endings if raw_channel(endings[0]) else []
-    for name in endings:
-        if topic.endswith(f'/{name}'):
-            namespace, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
-            return Place(namespace, machine, name)
+    for name in _names(topic):
+        if message_type == TOPICS.get(name, IMU):
+            return _below(topic, name)
     return None
 
 
-def near_misses(sources: Iterable[Source]) -> list[str]:
+def _names(topic: str) -> Iterator[str]:
+    """Yield the names of inputs that a topic ends with."""
+    yield from (name for name in TOPICS if topic.endswith(f'/{name}'))
+    if raw_channel(last := '/'.join(topic.split('/')[-3:])):
+        yield last
+
+
+def _below(topic: str, name: str) -> Place:
+    namespace, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
+    return Place(namespace, machine, name)
+
+
+def near_misses(sources: Iterable[Source], speed: SpeedSource = USUAL) -> list[str]:
     """Return a line for every topic that is named like an input but is none, and why."""
     told = []
     for source in sources:
-        named = next((name for name in (*TOPICS, IMU_NAME) if _is_named(source.topic, name)), '')
+        named = next(_names(source.topic), '')
+        if not named or (named in SPEED_TOPICS and speed.topic):
+            continue
         needed = TOPICS.get(named, IMU)
-        if named and (source.encoding != CDR or source.type != needed):
+        why = f'needed is {needed} ({CDR})'
+        if source.encoding == CDR and named in SPEED_TOPICS and not speed.is_usual:
+            why = speed.fits(source.type, source.definition)
+        elif source.encoding == CDR and source.type == needed:
+            why = ''
+        if why:
             told.append(f'{source.topic} is {source.type or "of no type"} ({source.encoding}), '
-                        f'needed is {needed} ({CDR})')
+                        f'{why}')
     return told
 
 
-def _is_named(topic: str, name: str) -> bool:
-    if name == IMU_NAME:
-        return raw_channel('/'.join(topic.split('/')[-3:])) is not None
-    return topic.endswith(f'/{name}')
+def inputs(
+    sources: Mapping[Source, int], speed: SpeedSource = USUAL,
+) -> dict[str, Input]:
+    """
+    Return every topic that is an input of a machine.
+
+    Parameters
+    ----------
+    sources : mapping of Source to int
+        Channels of a bag, and how many messages each has.
+    speed : SpeedSource
+        What tells speeds.
+
+    Raises
+    ------
+    InputError
+        If `speed` names a topic that tells none.
+
+    """
+    found = {source.topic: Input(where, source, number) for source, number in sources.items()
+             if source.encoding == CDR and (where := place(source.topic, source.type))}
+    measured = {topic: each for topic, each in found.items() if not each.tells_speed}
+    if speed.topic:
+        chosen = _named(sources, speed)
+        name = next((name for name in _names(chosen.topic) if name in SPEED_TOPICS), '')
+        where = _below(chosen.topic, name) if name else Place('', '', 'rotor/speed')
+        return {**measured, chosen.topic: Input(where, chosen, sources[chosen])}
+    if speed.is_usual:
+        return found
+    usual = {topic: each for topic, each in found.items() if each.tells_speed
+             and not speed.fits(each.source.type, each.source.definition)}
+    return {**measured, **(usual or {
+        source.topic: Input(_below(source.topic, name), source, number)
+        for source, number in sources.items() for name in _names(source.topic)
+        if name in SPEED_TOPICS and source.encoding == CDR
+        and not speed.fits(source.type, source.definition)})}
 
 
-def inputs(sources: Mapping[Source, int]) -> dict[str, tuple[Place, int]]:
-    """Return place and number of messages of every topic that is an input of a machine."""
-    return {source.topic: (found, number) for source, number in sources.items()
-            if source.encoding == CDR and (found := place(source.topic, source.type))}
+def _named(sources: Iterable[Source], speed: SpeedSource) -> Source:
+    """Return the channel that a speed is said to come from."""
+    topic = f'/{speed.topic.strip("/")}'
+    there = [source for source in sources if source.topic == topic]
+    if not there:
+        names = sorted({source.topic for source in sources})
+        near = get_close_matches(topic, names, n=1)
+        raise InputError(f'{topic}: no such topic; ' + (
+            f'did you mean {near[0]}?' if near else f'there are {", ".join(names) or "none"}'))
+    faults = {source: f'is encoded as {source.encoding}, needed is {CDR}'
+              if source.encoding != CDR else speed.fits(source.type, source.definition)
+              for source in there}
+    fitting = [source for source, fault in faults.items() if not fault]
+    if not fitting:
+        raise InputError(f'{topic}: ' + '; '.join(faults.values()))
+    usual = [source for source in fitting if source.type == JOINT_STATE] or fitting
+    if len(usual) > 1:
+        raise InputError(f'{topic}: has messages of several types that can tell a speed: '
+                         f'{", ".join(source.type for source in usual)}; name one of them')
+    return usual[0]
 
 
-def joints(path: Path, topics: Container[str]) -> list[str]:
-    """Return the joints that the first message of some topics tells of."""
-    found = bag_reader.messages(
-        path, lambda topic, kind: topic in topics and kind == JOINT_STATE)
-    for _, _, cdr in found:
-        with suppress(InputError):
-            return list(Layout.of(JOINT_STATE, cdr).texts['name'])
-    return []
+def candidates(sources: Iterable[Source]) -> str:
+    """Say which topics hold a number that could be a speed, if one were told which."""
+    found = [f'{source.topic} ({source.type})' for source in sources
+             if source.encoding == CDR and not next(_names(source.topic), '')
+             and source.type not in OWN_TOPICS.values()
+             and source.definition and not USUAL.fits(source.type, source.definition)]
+    return f'; numbers are on {", ".join(found[:MOST_TOLD])}' if found else ''
 
 
-def tells_speed(topic: str, message_type: str) -> bool:
-    """Return whether a topic can tell the speed of a machine."""
-    found = place(topic, message_type)
-    return found is not None and found.name in SPEED_TOPICS
-
-
-def is_input(topic: str, message_type: str) -> bool:
-    """Return whether a topic is an input of a machine: its speed or a measurement."""
-    return place(topic, message_type) is not None
-
-
-def speed_profile(path: Path, *, rotor_joint: str = ROTOR_JOINT) -> Iterator[SpeedBatch]:
+def speed_profile(path: Path, speed: SpeedSource = USUAL) -> Iterator[SpeedBatch]:
     """
     Read every speed in a bag or MCAP file; memory does not grow with its length.
 
-    A JointState counts at its own stamp, a Float64 at its time of reception.
+    A stamped message counts at its own stamp, any other at its time of reception.
     """
-    readers: dict[str, SpeedReader] = {}
-    for batch in bag_reader.batches(path, tells_speed, at_most=SPEEDS_AT_ONCE):
-        if batch.topic not in readers:
-            readers[batch.topic] = SpeedReader(
-                batch.type, rotor_joint=rotor_joint, note=lambda reason, count: None)
+    told = {topic: each for topic, each in inputs(bag_reader.sources(path), speed).items()
+            if each.tells_speed}
+    readers = {topic: SpeedReader(
+        each.source.type, speed, note=lambda reason, count: None, told=each.source.definition)
+        for topic, each in told.items()}
+    for batch in bag_reader.batches(
+            path, lambda topic, kind: topic in told and told[topic].source.type == kind,
+            at_most=SPEEDS_AT_ONCE):
         speeds = readers[batch.topic].read(batch.log_time_ns, batch.payloads)
         yield SpeedBatch(batch.topic, np.array(speeds.stamps, dtype=np.int64), speeds.speed)
 
 
 def read_profile(
-    path: str | Path, *, machine: str | None = None, rotor_joint: str = ROTOR_JOINT,
+    path: str | Path, *, machine: str | None = None, speed: SpeedSource = USUAL,
 ) -> Profile:
     """
     Read at which speeds a machine ran.
@@ -128,8 +197,8 @@ def read_profile(
         MCAP file or bag.
     machine : str or None
         Which machine; None for the only one.
-    rotor_joint : str
-        Joint whose velocity is the rotor speed.
+    speed : SpeedSource
+        What tells its speed.
 
     Returns
     -------
@@ -143,9 +212,10 @@ def read_profile(
 
     """
     found: dict[str, list[SpeedBatch]] = {}
-    for batch in speed_profile(Path(path), rotor_joint=rotor_joint):
-        told = place(batch.topic, JOINT_STATE) or place(batch.topic, FLOAT64)
-        found.setdefault(told.machine if told else '', []).append(batch)
+    for batch in speed_profile(Path(path), speed):
+        name = next(_names(batch.topic), '')
+        found.setdefault(_below(batch.topic, name).machine if name else machine or '',
+                         []).append(batch)
     wanted = next(iter(found), '') if machine is None and len(found) == 1 else machine
     if wanted is None or wanted not in found:
         raise InputError(f'{path}: machine must be one of {", ".join(found) or "none: no speed"}'

@@ -4,7 +4,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import errno
 import io
 from itertools import groupby, pairwise
@@ -27,8 +27,8 @@ import zstandard
 from rotorsoil_ros.bags.metadata import files
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP
+from rotorsoil_ros.wire.dating import LONGEST_NS
 from rotorsoil_ros.wire.definitions import ros_name
-from rotorsoil_ros.wire.handlers import LONGEST_NS
 from rotorsoil_ros.wire.messages import Records
 
 RECORD_HEADER = struct.Struct('<BQ')
@@ -50,11 +50,16 @@ Entry: TypeAlias = tuple['Source', int, bytes]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A channel of a bag: its topic, the type of its messages and how they are encoded."""
+    """
+    A channel of a bag: its topic, the type of its messages and how they are encoded.
+
+    `definition` is the `ros2msg` schema of the type, where the bag tells it.
+    """
 
     topic: str
     type: str
     encoding: str = CDR
+    definition: str = field(default='', compare=False, repr=False)
 
 
 def sources(path: Path, *, tell: Tell = lambda text: None) -> Counter[Source]:
@@ -163,10 +168,9 @@ def _counted(file: Path) -> Counter[Source] | None:
     if summary is None or summary.statistics is None:
         return None
     said = summary.statistics.channel_message_counts
-    names = {number: schema.name for number, schema in summary.schemas.items()}
     found: Counter[Source] = Counter()
     for channel in summary.channels.values():
-        found[_source(channel, names)] += said.get(channel.id, 0)
+        found[_source(channel, summary.schemas)] += said.get(channel.id, 0)
     return found
 
 
@@ -253,10 +257,12 @@ def _time(entry: Entry) -> int:
     return entry[1]
 
 
-def _source(channel: Channel, names: Mapping[int, str]) -> Source:
-    name = names.get(channel.schema_id, '')
-    encoding = channel.message_encoding
-    return Source(channel.topic, ros_name(name) if encoding == CDR else name, encoding)
+def _source(channel: Channel, schemas: Mapping[int, Schema]) -> Source:
+    schema = schemas.get(channel.schema_id)
+    name, encoding = schema.name if schema else '', channel.message_encoding
+    told = (schema.data.decode(errors='replace')
+            if schema and schema.encoding == 'ros2msg' else '')
+    return Source(channel.topic, ros_name(name) if encoding == CDR else name, encoding, told)
 
 
 class Contents:
@@ -270,7 +276,7 @@ class Contents:
         self._picks = picks
         self._with_payloads = with_payloads
         self._earliest_ns, self._latest_ns = possible_times(around_ns)
-        self._schemas: dict[int, str] = {0: ''}
+        self._schemas: dict[int, Schema] = {}
         self._sources: dict[int, tuple[Source, bool]] = {}
 
     @property
@@ -285,7 +291,7 @@ class Contents:
 
     def learn(self, summary: Summary) -> None:
         """Take schemas and channels from the summary: chunks will not come in their order."""
-        self._schemas |= {number: schema.name for number, schema in summary.schemas.items()}
+        self._schemas |= summary.schemas
         for channel in summary.channels.values():
             self._announce(channel)
 
@@ -326,7 +332,7 @@ class Contents:
             self.entries.append((source, log_time, payload))
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(ReadDataStream(io.BytesIO(body[at:at + length])))
-            self._schemas[schema.id] = schema.name
+            self._schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
             self._announce(Channel.read(ReadDataStream(io.BytesIO(body[at:at + length]))))
 

@@ -15,8 +15,8 @@ from rotorsoil_ros.machine.time_domain import shake, Shaking
 from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.cdr import ARRAYS, encode, Layout, NOT_MEASURED, SYNTHETIC
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
-from rotorsoil_ros.wire.handlers import ROTOR_JOINT
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT
 
 GRAVITY = 9.81
 SPEED_RATE_HZ = 50.0

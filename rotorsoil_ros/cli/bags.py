@@ -4,10 +4,23 @@ from argparse import Namespace
 import os
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
 from rotorsoil_ros.case import config, document, ross
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.table import opened
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.wire.speeds import SpeedSource
+
+
+def speed_source(arguments: Namespace) -> 'SpeedSource':
+    """Return what was said of how the plant tells the speed."""
+    from rotorsoil_ros.wire.speeds import SpeedSource
+
+    said = {name: value for name in SpeedSource.__slots__
+            if (value := getattr(arguments, f'speed_{name}')) is not None}
+    return SpeedSource(**said)
 
 
 def predict(arguments: Namespace) -> int:
@@ -20,6 +33,7 @@ def predict(arguments: Namespace) -> int:
         arguments.case, cache_directory=arguments.cache, overrides=arguments.overrides)
     with progress('predicting') as report:
         answered = answer(machine, arguments.profile, arguments.output, progress=report,
+                          speed=speed_source(arguments),
                           screen=arguments.rrd and recorder(arguments.rrd, machine))
     for remark in answered.remarks:
         print(remark, file=sys.stderr)
@@ -36,7 +50,8 @@ def replay(arguments: Namespace) -> int:
     from rotorsoil_ros.node.replay import replay as publish
 
     with progress('replaying') as report:
-        published = publish(arguments.profile, rate=arguments.rate, progress=report)
+        published = publish(arguments.profile, rate=arguments.rate, progress=report,
+                            speed=speed_source(arguments), machine=arguments.machine or '')
     print(f'{arguments.profile}: {published} messages published')
     return 0
 

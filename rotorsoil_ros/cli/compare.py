@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.zone_limits import ISO_10816_3
+from rotorsoil_ros.cli.bags import speed_source
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.figures.report import (
@@ -30,7 +31,7 @@ def compare(arguments: Namespace) -> int:
 
     slow_roll = arguments.slow_roll_rpm
     wish = Wish(
-        machine=arguments.machine or '',
+        machine=arguments.machine or '', speed=speed_source(arguments),
         matching=Matching(
             tolerance=arguments.tolerance_s,
             slow_roll_speed=math.nan if slow_roll is None else rpm_to_rad_s(slow_roll),

@@ -12,6 +12,7 @@ import rotorsoil_ros
 
 PLANT, SI = 'plant', 'si'
 _LONGEST_SWEEP = 10_000_000
+_SPEED_UNITS = ('rad_s', 'rpm', 'hz', 'deg_s')  # of `units`, which to import takes long
 
 
 class _OneLineParser(argparse.ArgumentParser):
@@ -260,11 +261,14 @@ def _add_live_verbs(verbs: _Verbs) -> None:
     predict.add_argument('--rrd', metavar='OUT.rrd', type=Path,
                          help='recording for the rerun viewer')
     predict.set_defaults(outputs=('output', 'rrd'))
+    _add_speed(predict)
     replay = _verb(verbs, 'replay', 'bags:replay',
                    'publish a recorded profile into the ROS graph', case=False)
     replay.add_argument('profile', metavar='PROFILE', type=Path, help='MCAP file or bag')
     replay.add_argument('--rate', metavar='R', type=_rate, default=1.0,
                         help='speed of replay (default: 1, as recorded)')
+    replay.add_argument('--machine', metavar='NAME', help='whose speed it is, if no topic says')
+    _add_speed(replay)
     recover = _verb(verbs, 'recover', 'bags:recover',
                     'save everything readable of a log whose writer was killed', case=False)
     recover.add_argument('broken', metavar='BROKEN.mcap', type=Path, help='MCAP file')
@@ -273,6 +277,22 @@ def _add_live_verbs(verbs: _Verbs) -> None:
     demo = _verb(verbs, 'demo', 'demo:demo',
                  'run up, dwell and coast down a machine before a live node', case=False)
     _add_output(demo, 'DIR', 'directory for log, recording and plots', default='demo_output')
+
+
+def _add_speed(verb: argparse.ArgumentParser) -> None:
+    """Add where the speed is told, and how; None: as usual."""
+    add = verb.add_argument_group('how the plant tells the speed').add_argument
+    add('--speed-topic', metavar='T', help='topic (default: joint_states and rotor/speed of the '
+                                           'machine)')
+    add('--speed-type', metavar='TYPE', help='type of its messages, if the topic has several')
+    add('--speed-field', metavar='PATH', help='number in the message, as in twist.angular.z or '
+        "velocity[2] (default: the joint's velocity, or the only number)")
+    add('--speed-unit', choices=_SPEED_UNITS, help='unit of the number (default: rad_s)')
+    add('--speed-ratio', metavar='Q', type=float,
+        help='turns of the rotor for one turn of what is told, negative where it counts '
+             'backwards (default: 1)')
+    add('--joint', '--rotor-joint', metavar='NAME', dest='speed_joint',
+        help='joint of a JointState (default: rotor)')
 
 
 def _add_compare(verbs: _Verbs) -> None:
@@ -290,6 +310,7 @@ def _add_compare(verbs: _Verbs) -> None:
         help='override the case file; may be repeated')
     add('--cache', metavar='DIR', type=Path, help='directory of computed tables')
     add('--machine', metavar='NAME', help='which machine, if the log tells of several')
+    _add_speed(compare)
     add('--tolerance-s', metavar='S', type=_positive, default=0.05,
         help='largest distance of stamps that belong together [s] (default: %(default)s)')
     add('--slow-roll-rpm', metavar='R', type=_positive,

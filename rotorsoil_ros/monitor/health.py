@@ -27,6 +27,7 @@ class Health:
         self.last_speed = math.nan
         self.publishers = 1
         self.standing = ''  # an error of the case itself, whatever comes in
+        self.explanations: dict[str, str] = {}
         self._last_ns: int | None = None
         self._faults = 0
         self._at_tick = self.counts.copy()
@@ -40,6 +41,10 @@ class Health:
         self.counts[reason] += count
         if reason in FAULTS or reason in REDATED:
             self._faults += count
+
+    def explain(self, reason: str, text: str) -> None:
+        """Say more of a reason: what the reader should know to mend it."""
+        self.explanations[reason] = text
 
     def receive(self, stamp_ns: IntArray, speed: FloatArray) -> None:
         """Count speeds [rad/s] and look whether their stamps [ns] go forward."""

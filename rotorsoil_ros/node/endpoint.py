@@ -20,9 +20,11 @@ from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
+from rotorsoil_ros.wire.dating import Arrival
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE, LOG, STRING
-from rotorsoil_ros.wire.handlers import Arrival, Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.handlers import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
 from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
+from rotorsoil_ros.wire.speeds import SpeedSource
 
 TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
 RAW_DEPTH = 1000  # samples kept while the node is busy
@@ -181,7 +183,7 @@ class Watch:
         topic = str(self._node.resolve_topic_name(f'{self.name}/{name}'))
         taken_in = inlet(
             name, topic, self.monitor, log=self._log.write,
-            rotor_joint=self._settings.value(f'{self.name}.rotor_joint'))
+            speed=SpeedSource(joint=self._settings.value(f'{self.name}.rotor_joint')))
         self._subscriptions.append(self._node.create_subscription(
             TYPES[kind], topic, partial(self._receive, taken_in),
             QoSProfile(depth=depth, reliability=reliability), raw=True))

@@ -24,7 +24,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.rules import Judging, Matching
 from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.handlers import ROTOR_JOINT
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT
 
 Rule: TypeAlias = Callable[[Any], str]
 

@@ -1,6 +1,6 @@
 """A recorded profile comes alive again: published as it was received, at its pace or another."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 import time
@@ -16,11 +16,13 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.profile import is_input, near_misses, tells_speed
-from rotorsoil_ros.bags.reader import CDR
+from rotorsoil_ros.bags.profile import ADVICE, candidates, Input, inputs, near_misses
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
+from rotorsoil_ros.wire.handlers import as_joint_states
+from rotorsoil_ros.wire.messages import JointStateWriter
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USUAL
 
 SENT_TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
 DEPTH = 1000
@@ -33,10 +35,13 @@ Progress = Callable[[int, int], None]
 
 def replay(
     profile: Path, *, rate: float = 1.0, wait_s: float = 10.0, context: Context | None = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, speed: SpeedSource = USUAL, machine: str = '',
 ) -> int:
     """
     Publish every speed and every measurement of a bag under its own name, stamps untouched.
+
+    A speed that is told in another way is published as the node understands it without being
+    told: JointStates [rad/s] on `<machine>/joint_states`.
 
     Parameters
     ----------
@@ -50,6 +55,10 @@ def replay(
         Of an initialised rclpy; without one, replay brings its own up and down.
     progress : callable
         Called with the number of messages published and their total.
+    speed : SpeedSource
+        What tells the speed.
+    machine : str
+        Whose speed it is, where no topic says.
 
     Returns
     -------
@@ -66,15 +75,7 @@ def replay(
     """
     if not 0.0 < rate < float('inf'):
         raise InputError(f'rate must be > 0 and finite, got {rate:g}')
-    sources = {source: number for source, number in bag_reader.sources(profile).items()
-               if number}
-    found = {source.topic: source.type for source in sources
-             if source.encoding == CDR and is_input(source.topic, source.type)}
-    if not any(tells_speed(topic, kind) for topic, kind in found.items()):
-        missed = ''.join(f'; {miss}' for miss in near_misses(sources))
-        raise InputError(f'{profile}: tells no speed on joint_states or rotor/speed{missed}')
-    total = sum(number for source, number in sources.items()
-                if found.get(source.topic) == source.type)
+    sent = _Sent.of(profile, speed, machine)
     with ExitStack() as stack:
         if context is None:
             context = Context()
@@ -82,25 +83,87 @@ def replay(
             stack.callback(context.try_shutdown)
         node = Node('rotorsoil_replay', context=context, start_parameter_services=False)
         stack.callback(node.destroy_node)
-        player = _Player(node, found)
+        player = _Player(node, sent)
         player.wait_for_listeners(wait_s)
-        return player.play(profile, rate, lambda done: progress and progress(done, total))
+        return player.play(profile, rate, lambda done: progress and progress(done, sent.total))
+
+
+class _Sent:
+    """What of a bag is sent, and under which topics and types."""
+
+    def __init__(self, found: Mapping[str, Input], speed: SpeedSource, machine: str) -> None:
+        self.found = found
+        self.total = sum(each.number for each in found.values())
+        self.names = {topic: topic for topic in found}
+        self._readers: dict[str, SpeedReader] = {}
+        self._writer = JointStateWriter([ROTOR_JOINT])
+        for topic, each in found.items() if not speed.is_usual else ():
+            if each.tells_speed:
+                self.names[topic] = (f'{each.place.namespace}/{each.place.machine or machine}'
+                                     '/joint_states')
+                self._readers[topic] = SpeedReader(
+                    each.source.type, speed, note=lambda reason, count: None,
+                    told=each.source.definition)
+
+    @classmethod
+    def of(cls, profile: Path, speed: SpeedSource, machine: str) -> '_Sent':
+        """Find what a bag tells; raise InputError where it tells no speed."""
+        sources = {source: number for source, number in bag_reader.sources(profile).items()
+                   if number}
+        try:
+            found = inputs(sources, speed)
+        except InputError as error:
+            raise InputError(f'{profile}: {error}') from error
+        speeds = [each for each in found.values() if each.tells_speed]
+        if not speeds:
+            missed = ''.join(f'; {miss}' for miss in near_misses(sources, speed))
+            raise InputError(f'{profile}: tells no speed on joint_states or rotor/speed{missed}'
+                             f'{candidates(sources)}{ADVICE}')
+        machines = {each.place.machine for each in found.values()} - {''}
+        nobodys = not speed.is_usual and not all(each.place.machine for each in speeds)
+        if nobodys and not machine and len(machines) != 1:
+            raise InputError(f'{profile}: no topic says whose speed it is; name the machine '
+                             '(--machine)')
+        return cls(found, speed, machine or next(iter(machines), ''))
+
+    @property
+    def types(self) -> dict[str, str]:
+        """Type of every topic that is sent."""
+        return {name: JOINT_STATE if topic in self._readers else self.found[topic].source.type
+                for topic, name in self.names.items()}
+
+    @property
+    def speeds(self) -> list[str]:
+        """Topics on which speeds are sent."""
+        return [self.names[topic] for topic, each in self.found.items() if each.tells_speed]
+
+    def messages(self, profile: Path) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time of reception and message, in the order of reception."""
+        for source, time_ns, cdr in bag_reader.messages(
+                profile, lambda topic, kind: topic in self.found
+                and self.found[topic].source.type == kind):
+            if reader := self._readers.get(source.topic):
+                speeds = reader.read([time_ns], [cdr])
+                if not speeds.messages:
+                    continue
+                cdr = as_joint_states('', self._writer, speeds).payloads[0]
+            yield self.names[source.topic], time_ns, cdr
 
 
 class _Player:
     """Publishers of the topics of a bag."""
 
-    def __init__(self, node: Node, found: dict[str, str]) -> None:
+    def __init__(self, node: Node, sent: _Sent) -> None:
         self._context = node.context
+        self._sent = sent
         self._publishers: dict[str, Publisher] = {
             topic: node.create_publisher(SENT_TYPES[kind], topic, QoSProfile(depth=DEPTH))
-            for topic, kind in found.items()}
-        self._speeds = [topic for topic, kind in found.items() if tells_speed(topic, kind)]
+            for topic, kind in sent.types.items()}
 
     def wait_for_listeners(self, wait_s: float) -> None:
         """Wait until somebody hears every speed topic, and a little for the others."""
         until = time.monotonic() + wait_s
-        while deaf := [topic for topic in self._speeds
+        while deaf := [topic for topic in self._sent.speeds
                        if not self._publishers[topic].get_subscription_count()]:
             if not self._context.ok():
                 return
@@ -116,11 +179,11 @@ class _Player:
     def play(self, profile: Path, rate: float, progress: Callable[[int], Any]) -> int:
         """Publish in the order of reception; each message when its time has come."""
         done, began, first_ns = 0, time.monotonic(), None
-        for source, log_time_ns, payload in bag_reader.messages(profile, is_input):
+        for topic, log_time_ns, payload in self._sent.messages(profile):
             first_ns = log_time_ns if first_ns is None else first_ns
             if not self._sleep_until(began + (log_time_ns - first_ns) / (rate * NANOSECONDS)):
                 return done
-            self._publishers[source.topic].publish(payload)
+            self._publishers[topic].publish(payload)
             done += 1
             progress(done)
         for publisher in self._publishers.values():

@@ -102,8 +102,7 @@ class _Walk:
             case Several(of=of, count=count):
                 self._find_several(of, cursor.count() if count is None else count, path)
             case Compound(fields=fields):
-                codes = {part.code if isinstance(part, Number) else '' for _, part in fields}
-                if len(fields) > 1 and len(codes) == 1 and '' not in codes:  # a vector
+                if kind.is_vector:
                     self._find_several(fields[0][1], len(fields), path)
                     return
                 for name, part in fields:
@@ -150,10 +149,10 @@ class Layout:
     dtype: np.dtype[Any]
 
     @classmethod
-    def of(cls, message_type: str, cdr: bytes) -> 'Layout':
+    def of(cls, message_type: str, cdr: bytes, told: str = '') -> 'Layout':
         """Read the layout of one message; raise InputError where it is not of its type."""
         walk = _Walk(cdr)
-        walk.find(compound(message_type), '')
+        walk.find(compound(message_type, told), '')
         kinds, offsets = zip(*walk.places.values(), strict=True) if walk.places else ((), ())
         dtype = np.dtype({'names': list(walk.places), 'formats': list(kinds),
                           'offsets': list(offsets), 'itemsize': len(cdr)})
@@ -305,29 +304,37 @@ class Accelerations:
 Decoded = TypeVar('Decoded', bound=JointStates | Accelerations)
 
 
-class Reader(Generic[Decoded]):
-    """Decodes messages as they come: one publisher keeps its layout, so that it is read once."""
+class Layouts:
+    """Finds the layouts of messages of one type: one publisher keeps its own, read once."""
+
+    def __init__(self, message_type: str, told: str = '') -> None:
+        self._type, self._definition = message_type, told
+        self._layout: Layout | None = None
+
+    def layout(self, cdr: bytes) -> Layout | None:
+        """Return the layout of a message, the same object for the same layout."""
+        if self._layout is None or not self._layout.fits(cdr):
+            try:
+                self._layout = Layout.of(self._type, cdr, self._definition)
+            except InputError:
+                self._layout = None
+        return self._layout
+
+
+class Reader(Layouts, Generic[Decoded]):
+    """Decodes messages as they come."""
 
     def __init__(
         self, message_type: str, decode: Callable[[Layout, Sequence[bytes]], Decoded],
     ) -> None:
-        self._type, self._decode = message_type, decode
-        self._layout: Layout | None = None
+        super().__init__(message_type)
+        self._decode = decode
 
     def runs(self, cdrs: Sequence[bytes]) -> Iterator[tuple[list[bytes], Decoded | None]]:
         """Split messages into runs of one layout, decoded; None where they are malformed."""
         for layout, run in groupby(cdrs, key=self.layout):
             messages = list(run)
             yield messages, self._decode(layout, messages) if layout else None
-
-    def layout(self, cdr: bytes) -> Layout | None:
-        """Return the layout of a message, the same object for the same layout."""
-        if self._layout is None or not self._layout.fits(cdr):
-            try:
-                self._layout = Layout.of(self._type, cdr)
-            except InputError:
-                self._layout = None
-        return self._layout
 
 
 class JointStateReader(Reader[JointStates]):

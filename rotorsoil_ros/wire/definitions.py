@@ -8,6 +8,8 @@ from importlib.resources import files
 import re
 from typing import TypeAlias
 
+from rotorsoil_ros.errors import InputError
+
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 IMU = 'sensor_msgs/msg/Imu'
 FLOAT64 = 'std_msgs/msg/Float64'
@@ -25,6 +27,7 @@ TYPE_HASHES = {
     LOG: 'e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac'}
 
 SEPARATOR = '=' * 80
+HEADER, TIME = 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time'
 NUMBERS = {  # how `struct` and numpy call them
     'bool': '?', 'byte': 'B', 'char': 'B', 'float32': 'f', 'float64': 'd', 'int8': 'b',
     'uint8': 'B', 'int16': 'h', 'uint16': 'H', 'int32': 'i', 'uint32': 'I', 'int64': 'q',
@@ -60,6 +63,12 @@ class Compound:
 
     fields: tuple[tuple[str, 'Kind'], ...]
 
+    @property
+    def is_vector(self) -> bool:
+        """Whether it is several numbers of one kind, which lie side by side."""
+        codes = {part.code if isinstance(part, Number) else '' for _, part in self.fields}
+        return len(self.fields) > 1 and len(codes) == 1 and '' not in codes
+
 
 Kind: TypeAlias = Number | Text | Several | Compound
 
@@ -83,14 +92,39 @@ def ros_name(name: str) -> str:
     return f'{package}/msg/{kind.rstrip("_")}' if package else name
 
 
+def compound(message_type: str, told: str = '') -> Compound:
+    """
+    Return the fields of a type.
+
+    Parameters
+    ----------
+    message_type : str
+        Such as `std_msgs/msg/String`.
+    told : str
+        Its `ros2msg` schema, as a bag or another package tells it; what that leaves out is
+        taken from what this package knows.
+
+    Raises
+    ------
+    InputError
+        If neither says of what it is made.
+
+    """
+    return _compound(message_type, f'MSG: {message_type}\n{told}' if told.strip() else '')
+
+
+def leads_with_stamp(kind: Compound) -> bool:
+    """Return whether messages begin with a stamp, their own or that of their header."""
+    return bool(kind.fields) and kind.fields[0][1] in (compound(HEADER), compound(TIME))
+
+
 @cache
-def compound(message_type: str) -> Compound:
-    """Return the fields of a type."""
-    return Compound(tuple(
-        (field['name'], _kind(message_type, field)) for field in _fields(message_type)))
+def _compound(message_type: str, told: str) -> Compound:
+    return Compound(tuple((field['name'], _kind(message_type, field, told))
+                          for field in _fields(message_type, told)))
 
 
-def _kind(owner: str, field: re.Match[str]) -> Kind:
+def _kind(owner: str, field: re.Match[str], told: str) -> Kind:
     of: Kind
     if code := NUMBERS.get(field['kind']):
         has_default = field['rest'] and not field['array']
@@ -98,7 +132,7 @@ def _kind(owner: str, field: re.Match[str]) -> Kind:
     elif field['kind'] == 'string':
         of = Text()
     else:
-        of = compound(_full_name(owner, field['kind']))
+        of = _compound(_full_name(owner, field['kind']), told)
     if field['array'] is None:
         return of
     count = field['array'].strip('[]')
@@ -115,9 +149,9 @@ def _with_parts(message_type: str) -> list[str]:
     return found
 
 
-def _fields(message_type: str) -> Iterator[re.Match[str]]:
+def _fields(message_type: str, told: str = '') -> Iterator[re.Match[str]]:
     """Yield the fields of a type in their order; its constants are none."""
-    for line in _source(message_type).splitlines():
+    for line in _source(message_type, told).splitlines():
         found = FIELD.match(line.split('#')[0].strip())
         if found and not found['rest'].startswith('='):
             yield found
@@ -130,8 +164,14 @@ def _full_name(owner: str, part: str) -> str:
 
 
 @cache
-def _source(message_type: str) -> str:
-    """Return the `.msg` file of a type as its package (of Jazzy) holds it."""
-    package, _, name = message_type.split('/')
+def _source(message_type: str, told: str = '') -> str:
+    """Return the `.msg` file of a type: as told, else as its package (of Jazzy) holds it."""
+    for part in re.split(f'^{SEPARATOR}$', told, flags=re.MULTILINE):
+        name, _, text = part.strip().partition('\n')
+        if name and ros_name(name.removeprefix('MSG:').strip()) == message_type:
+            return text
+    package, _, name = ros_name(message_type).split('/')
     source = files(__package__) / 'interfaces' / package / 'msg' / f'{name}.msg'
-    return source.read_text(encoding='utf-8')
+    if source.is_file():
+        return source.read_text(encoding='utf-8')
+    raise InputError(f'{message_type}: nothing tells of what it is made')

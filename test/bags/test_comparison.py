@@ -22,7 +22,6 @@ from rotorsoil_ros.monitor.rules import Judging, Matching
 from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
-from rotorsoil_ros.wire.handlers import inlet
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 FAN = Path('config/plant_fan.yaml')
@@ -56,9 +55,7 @@ def live(log, machine, *, tick_ns, judging=None):
                       judging=judging or Judging.of(machine.case))
     monitor.judge.take_criteria(criteria(
         machine.case, machine.model, machine.case.unbalance, machine.directory))
-    inlets = {topic: inlet(where.name, topic, monitor, rotor_joint='rotor',
-                           log=lambda records: None)
-              for topic, (where, _) in inputs.topics.items()}
+    inlets = inputs.inlets(monitor, lambda records: None)
     due_ns = None
     for source, at_ns, payload in bag_reader.messages(log, lambda topic, _: topic in inlets):
         due_ns = at_ns + tick_ns if due_ns is None else due_ns

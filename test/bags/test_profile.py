@@ -21,6 +21,7 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.cdr import joint_states, Layout
 from rotorsoil_ros.wire.definitions import FLOAT64, JOINT_STATE, STRING
+from rotorsoil_ros.wire.speeds import SpeedSource
 
 from records import topics_of
 
@@ -86,7 +87,7 @@ def test_the_rotor_is_found_by_its_name_and_stamps_count_not_reception(tmp_path)
     stamps, speeds = read(tmp_path / 'bag')
     assert stamps.tolist() == [START, START + 1, START + 2]
     np.testing.assert_array_equal(speeds, [2.0, 8.0, math.nan])
-    _, gear = read(tmp_path / 'bag', rotor_joint='gear')
+    _, gear = read(tmp_path / 'bag', speed=SpeedSource(joint='gear'))
     np.testing.assert_array_equal(gear, [3.0, 7.0, math.nan])
 
 

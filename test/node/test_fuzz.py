@@ -50,7 +50,7 @@ def inlets(machine):
     """Return inlets of a machine for every topic, and what comes out of them."""
     events = []
     monitor = Monitor('m', machine.table, machine.case.unbalance, sinks=[events.append])
-    return [inlet(name, f'/m/{name}', monitor, rotor_joint='rotor', log=events.append)
+    return [inlet(name, f'/m/{name}', monitor, log=events.append)
             for name in (*TOPICS, 'measured/disc_1_x/imu')], events
 
 

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from rotorsoil_ros.wire.handlers import Arrival, Dating, LONGEST_NS
+from rotorsoil_ros.wire.dating import Arrival, Dating, LONGEST_NS
 
 SECOND = 10**9
 START = 1_700_000_000 * SECOND
