@@ -46,7 +46,8 @@ _SHAPES = (_CONSTANT, _TABLE, _NUMBER, _AXES, _KEYS, _WORD)
 class Entry(BaseModel):
     """One mapping of a case file."""
 
-    model_config = ConfigDict(extra='forbid', frozen=True)
+    # The lowest pydantic that serves keeps names that begin with `model_` for itself.
+    model_config = ConfigDict(extra='forbid', frozen=True, protected_namespaces=())
 
     @model_validator(mode='wrap')
     @classmethod
