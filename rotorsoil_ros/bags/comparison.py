@@ -97,9 +97,10 @@ def compare(
     elif isinstance(case, (Path, str)):
         case = config.load(Path(case))
     case = case or _logged_case(log, descriptions)
-    spread = case.uncertainty if wish.soil_factor is None else replace(
-        case.uncertainty, shear_modulus_factor=wish.soil_factor)
-    expectation = Expectation.of(case, cache.directory(cache_directory), spread)
+    if wish.soil_factor is not None:
+        case = replace(case, uncertainty=replace(
+            case.uncertainty, shear_modulus_factor=wish.soil_factor))
+    expectation = Expectation.of(case, cache.directory(cache_directory))
     reading = _Reading(inputs, expectation, wish, descriptions, progress)
     found, hindsight = reading.read({})
     if hindsight:  # a slow roll that comes late is the runout of what was before it, too

@@ -279,7 +279,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
             'amplitude_margin': comparison.rules.amplitude_margin,
             'inside_share': comparison.rules.inside_share,
             'critical_margin': comparison.rules.critical_margin,
-            'shear_modulus_factor': expectation.spread.shear_modulus_factor,
+            'shear_modulus_factor': expectation.case.uncertainty.shear_modulus_factor,
             'zones': comparison.rules.zones.label},
         'channels': {points.channel: {
             'points': len(points.stamp_ns), 'used': int(points.used.sum()),

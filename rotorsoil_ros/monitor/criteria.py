@@ -20,7 +20,6 @@ from rotorsoil_ros.machine.band import Envelope, ResponseBand
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
-from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.monitor.quasistatic import Resonance
 
 # Critical speeds are looked for between these multiples of the highest speed.
@@ -44,8 +43,8 @@ class Expectation:
         Where omega = Omega, a little beyond the speed range.
     band : ResponseBand or None
         Its response on other soils; None on a support that knows of no soil.
-    spread : SoilSpread
-        How far those are from the one of the case.
+    directory : Path
+        Of the cache.
     note : str
         What could not be found, and why; empty if everything was.
 
@@ -56,18 +55,15 @@ class Expectation:
     table: ResponseTable
     modes: tuple[CriticalSpeed, ...]
     band: ResponseBand | None
-    spread: SoilSpread
+    directory: Path
     note: str = ''
 
     @classmethod
-    def of(
-        cls, case: Case, directory: Path, spread: SoilSpread | None = None,
-    ) -> 'Expectation':
+    def of(cls, case: Case, directory: Path) -> 'Expectation':
         """Solve a case, with tables out of a cache, on its soil and all of its spread."""
-        spread = spread or case.uncertainty
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
-        band = models.response_band(case, model, table, directory, spread)
+        band = models.response_band(case, model, table, directory, case.uncertainty)
         notes = list(unstable(table.stability))
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
         span = model.within_tables((min(low, case.speed_range[0] or low), high))
@@ -77,7 +73,7 @@ class Expectation:
         except NotSolvedError as error:
             modes = ()
             notes.append(f'critical speeds of the model are not known: {error}')
-        return cls(case, model, table, modes, band, spread, '; '.join(notes))
+        return cls(case, model, table, modes, band, directory, '; '.join(notes))
 
     @property
     def criticals(self) -> tuple[CriticalSpeed, ...]:
@@ -102,11 +98,22 @@ class Expectation:
                         dtype=complex)
 
     def criteria(self, unbalance: ComplexArray) -> 'Criteria':
-        """Return by what a measurement is judged under an unbalance, (p,) [kg m]."""
-        return Criteria(
+        """
+        Return by what a measurement is judged under an unbalance, (p,) [kg m].
+
+        What the cache holds comes first: a judge is right to the last bit, and older linear
+        algebra is not the same to the last bit from one solution to the next.
+        """
+        stored = stored_criteria(self.case, self.model, unbalance, self.directory)
+        if stored is not None:
+            return stored
+        found = Criteria(
             None if self.band is None else self.band.envelope(unbalance),
             tuple(self.resonances), (self.lowest_natural_speed('x'),
                                      self.lowest_natural_speed('z')))
+        Cache(self.directory).store(
+            _KIND, criteria_key(self.case, self.model, unbalance), found.to_arrays())
+        return found
 
 
 def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
@@ -201,12 +208,7 @@ def criteria(
 
     """
     stored = stored_criteria(case, model, unbalance, directory)
-    if stored is not None:
-        return stored
-    found = Expectation.of(case, directory).criteria(unbalance)
-    Cache(directory).store(
-        _KIND, criteria_key(case, model, unbalance), found.to_arrays())
-    return found
+    return stored or Expectation.of(case, directory).criteria(unbalance)
 
 
 def compute_aside(file: Path, unbalance: ComplexArray, directory: Path) -> Child:

@@ -22,13 +22,17 @@ from rotorsoil_ros.units import rad_s_to_rpm
 
 CASES = Path(__file__).parents[2] / 'config'
 FIELD = Path(__file__).parents[1] / 'cases'
-FEW = SoilSpread(samples=5)
+
+
+def few(case):
+    """Return a case with five soils in its band."""
+    return dataclasses.replace(case, uncertainty=SoilSpread(samples=5))
 
 
 @pytest.fixture(scope='module')
 def fan(tmp_path_factory):
     """Return what to expect of the fan."""
-    return Expectation.of(load(CASES / 'plant_fan.yaml'), tmp_path_factory.mktemp('cache'), FEW)
+    return Expectation.of(few(load(CASES / 'plant_fan.yaml')), tmp_path_factory.mktemp('cache'))
 
 
 def test_lowest_natural_speeds_are_told_by_direction(fan):
@@ -40,7 +44,7 @@ def test_lowest_natural_speeds_are_told_by_direction(fan):
 def test_bending_of_the_shaft_makes_no_support_flexible(tmp_path):
     # Both first bending modes, 1980 and 2024 rpm, lie in the range of the rotor kit.
     case = load(CASES / 'rk4_rotor_kit.yaml')
-    found = Expectation.of(case, tmp_path, FEW)
+    found = Expectation.of(few(case), tmp_path)
     assert len(found.criticals) == 2
     assert found.lowest_natural_speed('x') == found.lowest_natural_speed('z') == math.inf
     assert found.band is None
@@ -48,7 +52,7 @@ def test_bending_of_the_shaft_makes_no_support_flexible(tmp_path):
 
 def test_a_bearing_table_of_the_speed_range_clips_what_is_looked_for(tmp_path):
     case = load(FIELD / 'fan_table' / 'case.yaml')
-    found = Expectation.of(case, tmp_path, FEW)
+    found = Expectation.of(few(case), tmp_path)
     assert found.band is not None
     assert len(found.modes) == 3
     assert 'looked for from 100 to 1800 rpm only: tables of bearings end there' in found.note
@@ -64,7 +68,7 @@ def test_band_of_infinite_elements_solves_no_soil(tmp_path, monkeypatch):
         raise AssertionError('the soil was solved again')
 
     monkeypatch.setattr(elements_tabulate, 'tabulate', refuse)
-    found = Expectation.of(case, tmp_path, FEW)
+    found = Expectation.of(few(case), tmp_path)
     assert found.band is not None
     assert len(found.band.tables) == 5
 

@@ -248,6 +248,7 @@ def test_without_rerun_the_reason_is_told(machine, tmp_path, monkeypatch):
 
 
 def test_a_new_recording_opens_with_the_models_that_it_rests_on(machine, tmp_path):
+    pytest.importorskip('rerun', reason='rerun-sdk is optional')
     told = Model('fan', START, machine.description('fan', machine.case.unbalance))
     with open_viewer(tmp_path / 'a.rrd', {'fan': machine}) as sink:
         sink.show([told, predicted(machine, np.full(3, 300.0))])
