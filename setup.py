@@ -21,11 +21,13 @@ setup(
     python_requires='>=3.11,<3.14',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     # rotorsoil_ros/config is a link to config: reachable without an ament index, kept once.
-    package_data={NAME: ['py.typed', 'config/*.yaml', 'wire/interfaces/*/msg/*.msg']},
+    package_data={NAME: ['py.typed', 'config/*.yaml', 'config/library/*.yaml',
+                         'wire/interfaces/*/msg/*.msg']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', sorted(glob('config/*.yaml'))),
+        (f'share/{NAME}/config/library', sorted(glob('config/library/*.yaml'))),
         (f'share/{NAME}/launch', sorted(glob('launch/*.py') + glob('launch/*.yaml'))),
     ],
     zip_safe=False,

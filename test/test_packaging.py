@@ -19,6 +19,7 @@ import rotorsoil_ros
 
 ROOT = Path(__file__).parents[1]
 CASES = sorted((ROOT / 'config').glob('*.yaml'))
+LIBRARY = sorted((ROOT / 'config' / 'library').glob('*.yaml'))
 
 # What pip installs, and what package.xml calls it. The wheels of ROS stand for several packages.
 ROS_NAMES = {
@@ -83,6 +84,8 @@ def test_data_files_exist_and_hold_every_case(arguments):
     assert installed['share/rotorsoil_ros'] == ['package.xml']
     assert [Path(name).name for name in installed['share/rotorsoil_ros/config']] == [
         path.name for path in CASES]
+    assert [Path(name).name for name in installed['share/rotorsoil_ros/config/library']] == [
+        path.name for path in LIBRARY]
     assert installed['share/rotorsoil_ros/launch']
     for sources in installed.values():
         assert all((ROOT / source).is_file() for source in sources)
@@ -115,8 +118,10 @@ def test_build_holds_cases_and_types(tmp_path):
                    cwd=source, check=True, capture_output=True)
     package = target / 'rotorsoil_ros'
     assert (package / 'py.typed').is_file()
-    assert sorted(path.name for path in (package / 'config').iterdir()) == [
+    assert sorted(path.name for path in (package / 'config').glob('*.yaml')) == [
         path.name for path in CASES]
+    assert sorted(path.name for path in (package / 'config' / 'library').iterdir()) == [
+        path.name for path in LIBRARY]
     assert {path.relative_to(package) for path in package.rglob('*.py')} == {
         path.relative_to(ROOT / 'rotorsoil_ros')
         for path in (ROOT / 'rotorsoil_ros').rglob('*.py')}
@@ -156,8 +161,9 @@ def test_source_distribution_holds_what_the_repository_holds(unpacked):
     kept = {str(path.relative_to(unpacked)) for path in unpacked.rglob('*')}
     forge = {'.gitignore', '.github/workflows/tests.yml', 'rotorsoil_ros/config'}
     assert set(listed.stdout.splitlines()) - kept - forge == set()
-    assert sorted(path.name for path in (unpacked / 'rotorsoil_ros' / 'config').iterdir()) == [
-        path.name for path in CASES]
+    config = unpacked / 'rotorsoil_ros' / 'config'
+    assert sorted(path.name for path in config.glob('*.yaml')) == [path.name for path in CASES]
+    assert (config / 'library').is_dir()
 
 
 def test_source_distribution_passes_its_tests(unpacked):

@@ -30,8 +30,8 @@ _LARGEST_ECCENTRICITY = 2e-2
 def slips(case: Case) -> Iterator[str]:
     """Yield a question for every number that is outside what such a thing ever has."""
     if case.soil is not None:
-        yield from _asked('soil.density', case.soil.density, _SOIL_DENSITY)
-        yield from _asked('soil.shear_modulus', case.soil.shear_modulus, _SOIL_MODULUS)
+        yield from asked('soil.density', case.soil.density, _SOIL_DENSITY)
+        yield from asked('soil.shear_modulus', case.soil.shear_modulus, _SOIL_MODULUS)
     yield from _of_shaft(case)
     yield from _of_bearings(case)
     for index, block in enumerate(case.foundations):
@@ -44,9 +44,23 @@ def slips(case: Case) -> Iterator[str]:
                f'{_number(1e-6 * total)} (in g mm)?')
 
 
-def _asked(
+def asked(
     key: str, value: float, known: tuple[float, float, str, Sequence[float]],
 ) -> Iterator[str]:
+    """
+    Yield a question about a value that no such thing has.
+
+    Parameters
+    ----------
+    key : str
+        Where it stands.
+    value : float
+        What it is.
+    known : tuple
+        Lowest and highest that such a thing has, the unit, and by which factors a slip of the
+        unit is off, the likeliest first.
+
+    """
     low, high, unit, factors = known
     if low <= value <= high:
         return
@@ -64,13 +78,13 @@ def _of_shaft(case: Case) -> Iterator[str]:
     materials: dict[Material, str] = {}
     for index, section in enumerate(case.rotor.shaft):
         place = f'rotor.shaft.{index}'
-        yield from _asked(f'{place}.outer_diameter', max(section.outer_diameter), _DIAMETER)
+        yield from asked(f'{place}.outer_diameter', max(section.outer_diameter), _DIAMETER)
         materials.setdefault(section.material, place)
     for material, place in materials.items():
         if material.density > 0.0:
-            yield from _asked(f'{place}: density of its material', material.density,
+            yield from asked(f'{place}: density of its material', material.density,
                               _MATERIAL_DENSITY)
-        yield from _asked(f'{place}: young_modulus of its material', material.young_modulus,
+        yield from asked(f'{place}: young_modulus of its material', material.young_modulus,
                           _YOUNG_MODULUS)
 
 
@@ -81,7 +95,7 @@ def _of_bearings(case: Case) -> Iterator[str]:
         for axis, value in zip(('xx', 'zz'), np.diagonal(values).tolist(), strict=True):
             # None at all is a damper or a seal.
             if value > 0.0:
-                yield from _asked(f'rotor.bearings.{index}.stiffness.{axis}', value, _STIFFNESS)
+                yield from asked(f'rotor.bearings.{index}.stiffness.{axis}', value, _STIFFNESS)
 
 
 def _of_block(case: Case, place: str, block: Foundation) -> Iterator[str]:

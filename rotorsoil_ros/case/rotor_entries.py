@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import schema
+from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.schema import Place
@@ -18,12 +19,6 @@ from rotorsoil_ros.rotor.disc import Disc, permissible_unbalance
 from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 from rotorsoil_ros.units import rpm_to_rad_s
 
-# What a case may call by its name. EN 1993-1-1 (steel), EN 10088-1 (1.4301), EN 1561 (GJL-250),
-# EN 1999-1-1 (aluminium): E [Pa], nu [-], rho [kg/m^3].
-MATERIALS = {
-    'steel': Material(2.1e11, 0.3, 7850.0), 'stainless_steel': Material(2.0e11, 0.3, 7900.0),
-    'cast_iron': Material(1.08e11, 0.26, 7200.0), 'aluminium': Material(7.0e10, 0.3, 2700.0),
-}
 _INERTIAS = ('mass', 'diametral_inertia', 'polar_inertia')
 _DIMENSIONS = ('outer_diameter', 'inner_diameter', 'width', 'density')
 
@@ -72,7 +67,7 @@ class RotorEntries:
             raise self.faults.error(*place, problem='is missing, and so is that of '
                                                     + '.'.join(map(str, section)))
         if not isinstance(chosen, schema.MaterialEntry):
-            return MATERIALS[chosen]
+            return library.material(chosen)
         with self.faults.at(*place, entry=chosen):
             return Material(**dict(chosen))
 

@@ -300,6 +300,7 @@ class Uncertainty(Entry):
     foundation_mass_factor: Ratio | None = None
     rotor_mass_factor: Ratio | None = None
     shaft_stiffness_factor: Ratio | None = None
+    shaft_height_factor: Ratio | None = None
     unbalance_factor: Ratio | None = None
     model_form: StrictBool | None = None
 

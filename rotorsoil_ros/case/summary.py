@@ -41,7 +41,8 @@ _UNCERTAIN = {
     'soil_density_factor': 'density of the soil', 'bearing_stiffness_factor': 'bearing stiffness',
     'bearing_damping_factor': 'bearing damping', 'pedestal_stiffness_factor': 'pedestals',
     'foundation_mass_factor': 'mass of the foundation', 'rotor_mass_factor': 'mass of the discs',
-    'shaft_stiffness_factor': 'stiffness of the shaft', 'unbalance_factor': 'unbalance',
+    'shaft_stiffness_factor': 'stiffness of the shaft', 'shaft_height_factor': 'shaft height',
+    'unbalance_factor': 'unbalance',
 }
 
 

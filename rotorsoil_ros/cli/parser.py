@@ -190,7 +190,20 @@ def _add_units(verb: argparse.ArgumentParser) -> None:
                            'a terminal); si: m, rad, rad/s (default in files)')
 
 
+def _add_new(verbs: _Verbs) -> None:
+    new = _verb(verbs, 'new', 'new:new', 'write the case of a machine from what a plant knows',
+                case=False)
+    new.add_argument('kind', metavar='KIND', nargs='?',
+                     help='fan, pump, motor_driven or turbine')
+    new.add_argument('--answer', metavar='KEY=VALUE', dest='answers', action='append', default=[],
+                     help='what is known, as in rpm=990; may be repeated (default: asked for on a '
+                          'terminal)')
+    new.add_argument('--questions', action='store_true', help='list what may be answered')
+    _add_output(new, 'CASE.yaml', 'case file to write', default='-')
+
+
 def _add_case_verbs(verbs: _Verbs) -> None:
+    _add_new(verbs)
     _verb(verbs, 'check', 'report:check',
           'validate a case; print its derived quantities and warnings')
     _verb(verbs, 'tabulate', 'report:tabulate', 'compute or load the tables of a case')

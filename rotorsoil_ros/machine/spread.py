@@ -57,6 +57,8 @@ class SoilSpread:
         Of mass and inertia of all blocks with what stands on them; of all discs.
     shaft_stiffness_factor : float
         Of the bending stiffness of the shaft, its mass kept.
+    shaft_height_factor : float
+        Of the height of the shaft above the contact.
     unbalance_factor : float
         Of the unbalance, all planes alike.
 
@@ -78,6 +80,7 @@ class SoilSpread:
     foundation_mass_factor: float = 1.0
     rotor_mass_factor: float = 1.0
     shaft_stiffness_factor: float = 1.0
+    shaft_height_factor: float = 1.0
     unbalance_factor: float = 1.0
 
     def __post_init__(self) -> None:
@@ -154,7 +157,9 @@ class SoilSpread:
             bearing, stiffness=scale('bearing_stiffness_factor'),
             damping=scale('bearing_damping_factor'), pedestal=scale('pedestal_stiffness_factor'))
             for bearing in rotor.bearings)
-        rotor = _other_rotor(replace(rotor, bearings=bearings), mass=scale('rotor_mass_factor'),
+        rotor = replace(rotor, bearings=bearings,
+                        shaft_height=scale('shaft_height_factor') * rotor.shaft_height)
+        rotor = _other_rotor(rotor, mass=scale('rotor_mass_factor'),
                              stiffness=scale('shaft_stiffness_factor'))
         return replace(model, rotor=rotor, foundations=blocks)
 

@@ -14,6 +14,9 @@ from rotorsoil_ros.units import rad_s_to_rpm
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
+# Share of a speed by which round-off may put it beyond a table.
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class SpeedTable:
@@ -165,13 +168,15 @@ class Bearing:
 
         """
         low, high = self.speed_range
-        outside = ~((speed >= low) & (speed <= high))
+        # A speed at the end of a table may come back from a sweep by a rounding beyond it.
+        held = np.clip(speed, low, high)
+        outside = ~(np.abs(speed - held) <= _ROUNDING * np.abs(speed))
         if np.any(outside):
             raise OutOfTableError(
                 f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm, the '
                 f'table of {self.name}, got {rad_s_to_rpm(float(speed[outside][0])):g} rpm')
         stiffness, damping = (
-            matrix(speed) if isinstance(matrix, SpeedTable)
+            matrix(held) if isinstance(matrix, SpeedTable)
             else np.broadcast_to(matrix, (len(speed), 2, 2))
             for matrix in (self.stiffness, self.damping))
         return stiffness, damping

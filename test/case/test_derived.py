@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.case.rotor_entries import MATERIALS
 from rotorsoil_ros.errors import InputError
 
 CONFIG = Path(__file__).parents[2] / 'config'
@@ -118,7 +118,7 @@ def test_block_that_does_not_follow_is_told(block, fault):
 def test_material_may_be_called_by_its_name(name):
     case = load(FAN, [f'rotor.material={name}', 'rotor.shaft.1.material=steel'])
     assert case.rotor.shaft[1].material.young_modulus == 2.1e11
-    assert case.rotor.shaft[0].material == MATERIALS[name]
+    assert case.rotor.shaft[0].material == library.material(name)
 
 
 def test_unknown_material_is_told_with_those_that_are_known():

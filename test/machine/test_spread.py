@@ -33,6 +33,7 @@ CHANGED = {
         'polar_inertia: 1.0}',
         'rotor.discs.1={name: wheel, position: 1.6, mass: 640, diametral_inertia: 56, '
         'polar_inertia: 102}'],
+    'shaft_height_factor': ['rotor.shaft_height=4.0'],
     'shaft_stiffness_factor': ['rotor.material.young_modulus=4.2e11'],
 }
 

@@ -1,0 +1,111 @@
+"""What is typical, against published examples, closed forms and the ranges it came from."""
+
+import math
+
+import pytest
+
+from rotorsoil_ros.case import schema
+from rotorsoil_ros.case.authoring import library
+from rotorsoil_ros.case.authoring.library import MachineKind, PedestalKind, SoilClass
+from rotorsoil_ros.case.authoring.questions import Answers
+from rotorsoil_ros.ground.soil import Soil
+
+ECCENTRICITY = 0.6
+
+
+def test_ball_and_roller_are_those_of_the_published_examples():
+    # Friswell et al., as ROSS documents them: eight elements of 30 mm under 500 N, contact angle
+    # 30 degrees, which a deep groove bearing does not have.
+    ball = library.bearing('ball', diameter=0.03 / 0.25, load=500.0, speed=100.0)
+    tilted = math.cos(math.pi / 6.0) ** (5.0 / 3.0)
+    assert ball.stiffness['zz'] * tilted == pytest.approx(1.00906269e8, rel=1e-3)
+    assert ball.stiffness['xx'] * tilted == pytest.approx(4.64168838e7, rel=1e-3)
+    roller = library.bearing('rolling', diameter=0.03 / 0.15, load=500.0, speed=100.0)
+    tilted, fewer = math.cos(math.pi / 6.0) ** 1.9, (8.0 / 16.0) ** 0.9
+    assert roller.stiffness['zz'] * tilted * fewer == pytest.approx(5.56779444e8, rel=1e-6)
+    assert not ball.is_film
+
+
+def test_journal_bearing_is_that_of_short_bearing_theory():
+    # Friswell et al. (2010), eqs. (5.85) to (5.90), v along the load, u across; spin takes z into
+    # x here, so that both cross terms change their sign.
+    e, one, pi2 = ECCENTRICITY, 1.0 - ECCENTRICITY**2, math.pi**2
+    h = (pi2 * one + 16.0 * e**2) ** -1.5
+    root = e * math.sqrt(one)
+    stiffness = {
+        'xx': 4.0 * h * (pi2 * (2.0 - e**2) + 16.0 * e**2),
+        'xz': -h * math.pi * (pi2 * one**2 - 16.0 * e**4) / root,
+        'zx': h * math.pi * (pi2 * one * (1.0 + 2.0 * e**2) + 32.0 * e**2 * (1.0 + e**2)) / root,
+        'zz': 4.0 * h * (pi2 * (1.0 + 2.0 * e**2) + 32.0 * e**2 * (1.0 + e**2) / one)}
+    damping = {
+        'xx': 2.0 * h * math.pi * math.sqrt(one) * (pi2 * (1.0 + 2.0 * e**2) - 16.0 * e**2) / e,
+        'xz': 8.0 * h * (pi2 * (1.0 + 2.0 * e**2) - 16.0 * e**2),
+        'zz': 2.0 * h * math.pi * (pi2 * one**2 + 48.0 * e**2) / root}
+    damping['zx'] = damping['xz']
+    found = library.bearing('journal', diameter=0.1, load=2000.0, speed=50.0)
+    clearance = 0.75e-4
+    assert found.is_film
+    for key, value in stiffness.items():
+        assert found.stiffness[key] == pytest.approx(value * 2000.0 / clearance, rel=0.02)
+        assert found.damping[key] == pytest.approx(
+            damping[key] * 2000.0 / (clearance * 50.0), rel=0.02)
+
+
+@pytest.mark.parametrize('name', library.names(library.SOILS))
+def test_every_soil_can_be_one_at_both_ends_of_its_ranges(name):
+    found = SoilClass.named(name)
+    for end in (0, 1):
+        density, velocity = found.density[end], found.shear_wave_velocity[end]
+        Soil(density * velocity**2, found.poisson_ratio[end], density,
+             2.0 * found.damping_ratio[end])
+    for low, high in (found.shear_wave_velocity, found.poisson_ratio, found.density,
+                      found.damping_ratio):
+        assert 0.0 < low < high
+
+
+def test_soils_lie_where_eurocode_8_puts_them():
+    # EN 1998-1:2004, table 3.1: D below 180, C 180 to 360, B 360 to 800 m/s.
+    ranges = {name: SoilClass.named(name).shear_wave_velocity
+              for name in library.names(library.SOILS)}
+    assert ranges['loose_sand'][1] <= 180.0
+    assert ranges['soft_clay'][1] <= 180.0
+    assert ranges['dense_sand'] == ranges['stiff_clay'] == (180.0, 360.0)
+    assert ranges['weathered_rock'][0] > 360.0
+
+
+def test_undrained_clay_hardly_changes_its_volume():
+    for name in ('soft_clay', 'stiff_clay'):
+        low, high = SoilClass.named(name).poisson_ratio
+        assert low >= 0.45
+        assert high < 0.5
+
+
+def test_pedestal_damps_by_its_ratio():
+    found = PedestalKind.named('steel')
+    moving = 1.25 * 400.0
+    for key, damping in found.damping(400.0).items():
+        assert damping / (2.0 * math.sqrt(found.stiffness[key] * moving)) == pytest.approx(0.02)
+
+
+def test_motor_of_a_torque_carries_it_by_the_stress_on_its_surface():
+    kind = MachineKind.named('motor_driven')
+    diameter = kind.diameter(torque=723.0, speed=103.7)
+    surface = math.pi * diameter * kind.width * diameter
+    assert kind.surface_stress * surface * 0.5 * diameter == pytest.approx(723.0)
+    fan = MachineKind.named('fan').diameter(torque=723.0, speed=103.7)
+    assert 0.5 * fan * 103.7 == pytest.approx(80.0)
+
+
+@pytest.mark.parametrize('key, shelf', [('soil', library.SOILS), ('bearing', library.BEARINGS),
+                                        ('kind', library.MACHINES),
+                                        ('pedestal', library.PEDESTALS)])
+def test_every_entry_can_be_answered(key, shelf):
+    for name in library.names(shelf):
+        Answers(**{'kind': 'fan', 'power_kw': 1.0, 'rpm': 1000.0, key: name})
+
+
+def test_every_material_of_the_schema_is_in_the_library():
+    words = schema.MaterialEntry.model_fields
+    for name in library.names('materials'):
+        assert set(library.entries('materials')[name]) == set(words)
+        schema.Section(length=1.0, outer_diameter=0.1, elements=1, material=name)
