@@ -10,6 +10,8 @@ from rotorsoil_ros.arrays import FloatArray
 RADIANS_PER_TURN = 2.0 * math.pi
 SECONDS_PER_MINUTE = 60.0
 
+GRAVITY = 9.81  # [m/s^2]
+
 # rad/s in one of each unit that a speed is told in.
 SPEED_UNITS = {'rad_s': 1.0, 'rpm': RADIANS_PER_TURN / SECONDS_PER_MINUTE,
                'hz': RADIANS_PER_TURN, 'deg_s': math.radians(1.0)}

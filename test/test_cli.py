@@ -215,7 +215,7 @@ def test_bad_input_is_one_line_and_status_2(arguments, problem, capfd):
 
 @pytest.mark.parametrize('arguments, problem', [
     ([], 'rotorsoil: the following arguments are required: VERB'),
-    (['nothing'], "rotorsoil: argument VERB: 'nothing' is not known; it must be one of check,"),
+    (['nothing'], "rotorsoil: argument VERB: 'nothing' is not known; it must be one of new,"),
     (['chek', PAPER], "rotorsoil: argument VERB: 'chek' is not known; did you mean check?"),
     (['response', PAPER, '--rpm', '1:2:3', '--outptu', 'x'],
      'rotorsoil: unrecognized arguments: --outptu x; did you mean --output?'),

@@ -1,14 +1,12 @@
 """`rotorsoil new`: by options, and as a dialogue on a terminal."""
 
 import os
+import pty
 import subprocess
 import sys
 
-import pytest
-
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.cli import main
-from rotorsoil_ros.cli.new import new  # noqa: F401 - the verb is found by its name
 
 FAN = ['new', 'fan', '--answer', 'power_kw=75', '--answer', 'rpm=990', '--answer',
        'soil=dense_sand']
@@ -57,10 +55,7 @@ def test_questions_name_every_key_with_its_unit(capsys):
     assert 'loose_sand, dense_sand' in said
 
 
-@pytest.mark.skipif(sys.platform == 'win32', reason='no pseudo terminal')
 def test_dialogue_asks_again_and_takes_an_empty_answer_as_not_known(tmp_path):
-    import pty
-
     out = tmp_path / 'pump.yaml'
     ours, theirs = pty.openpty()
     typed = ['nonsense', 'pump', '', '-5', '55', '', '2980', '', '140', '60 mm', *[''] * 9,

@@ -12,13 +12,12 @@ from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.machine.band import on_soils
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.time_domain import shake, Shaking
-from rotorsoil_ros.units import rpm_to_rad_s
+from rotorsoil_ros.units import GRAVITY, rpm_to_rad_s
 from rotorsoil_ros.wire.cdr import ARRAYS, encode, Layout, NOT_MEASURED, SYNTHETIC
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 from rotorsoil_ros.wire.speeds import ROTOR_JOINT
 
-GRAVITY = 9.81
 SPEED_RATE_HZ = 50.0
 SLICE_S = 0.1
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.authoring import new_case, questions
-from rotorsoil_ros.case.authoring.questions import Question, QUESTIONS
+from rotorsoil_ros.case.authoring.questions import Inquiry, QUESTIONS
 from rotorsoil_ros.cli.table import opened
 from rotorsoil_ros.errors import InputError
 
@@ -63,7 +63,7 @@ def _asked(given: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _answer(question: Question) -> Any:
+def _answer(question: Inquiry) -> Any:
     """Ask until an answer can be one; None where it is not known."""
     unit = f' [{question.unit}]' if question.unit else ''
     choices = f' ({", ".join(question.choices)})' if question.choices else ''

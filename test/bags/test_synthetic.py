@@ -7,7 +7,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.synthetic import GRAVITY, profile, Truth, write_synthetic
+from rotorsoil_ros.bags.synthetic import profile, Truth, write_synthetic
+from rotorsoil_ros.units import GRAVITY
 
 START = 1_790_000_000_000_000_000
 TRUTH = Truth(shear_modulus_factor=1.0, growth=0.0, noise=0.0, slowest_rpm=900.0,

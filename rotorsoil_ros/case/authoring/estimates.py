@@ -11,9 +11,7 @@ from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.authoring.library import Coefficients, MachineKind, PedestalKind, SoilClass
 from rotorsoil_ros.case.authoring.questions import Answers, SOURCE
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.units import rpm_to_rad_s
-
-GRAVITY = 9.81
+from rotorsoil_ros.units import GRAVITY, rpm_to_rad_s
 
 # Bearings stand at least so far inside the ends of a block that nobody told.
 _LENGTH_OVER_SPAN = 1.25

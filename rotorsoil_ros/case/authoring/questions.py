@@ -27,7 +27,7 @@ SOURCE = '--answer'
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class Inquiry:
     """
     One thing that a plant may know.
 
@@ -72,34 +72,34 @@ class Question:
 _MM, _TON = (1e-3, 1e-2), (1e3,)
 
 QUESTIONS = (
-    Question('kind', '', 'which kind of machine'),
-    Question('name', '', 'how the machine is called: small letters, digits and _', 'its kind'),
-    Question('power_kw', 'kW', 'rated power', known=(0.1, 1e6), slips=(1e-3,)),
-    Question('rpm', 'rpm', 'rated speed', known=(10.0, 1e5)),
-    Question('rotor_mass', 'kg', 'mass of all that turns', 'by kind and size', (0.5, 5e5), _TON),
-    Question('shaft_diameter', 'm', 'diameter of the shaft between its bearings',
-             'by torque and first bending', (5e-3, 3.0), _MM),
-    Question('bearing', '', 'type of the bearings', 'usual for the kind'),
-    Question('bearing_span', 'm', 'distance of the bearings', 'by size', (0.02, 50.0), _MM),
-    Question('overhang', 'm', 'from the last bearing to the middle of an overhung wheel',
-             'by size', (0.02, 20.0), _MM),
-    Question('pedestal', '', 'what the bearings stand on', 'usual for the kind'),
-    Question('machine_mass', 'kg', 'mass of all that stands on the block and does not turn: '
-             'motor, casing, frame', 'by torque and rotor', (1.0, 1e7), _TON),
-    Question('block_width', 'm', 'width of the foundation block, across the shaft',
-             'three times the mass of the machine', (0.1, 60.0), _MM),
-    Question('block_length', 'm', 'its length, along the shaft', 'as its width', (0.1, 60.0),
-             _MM),
-    Question('block_height', 'm', 'its height', 'as its width', (0.1, 20.0), _MM),
-    Question('shaft_height', 'm', 'height of the shaft above the top of the block', 'by size',
-             (0.02, 20.0), _MM),
-    Question('soil', '', 'class of the soil below the block', 'unknown'),
-    Question('shear_wave_velocity', 'm/s', 'velocity of shear waves in it, if measured',
-             'by class', (30.0, 3500.0), (1e3,)),
-    Question('density', 'kg/m^3', 'density of the soil, if measured', 'by class',
-             (800.0, 3500.0), (1e3,)),
-    Question('balance_grade', '', 'balance grade of ISO 21940-11, as in G6.3',
-             'usual for the kind'),
+    Inquiry('kind', '', 'which kind of machine'),
+    Inquiry('name', '', 'how the machine is called: small letters, digits and _', 'its kind'),
+    Inquiry('power_kw', 'kW', 'rated power', known=(0.1, 1e6), slips=(1e-3,)),
+    Inquiry('rpm', 'rpm', 'rated speed', known=(10.0, 1e5)),
+    Inquiry('rotor_mass', 'kg', 'mass of all that turns', 'by kind and size', (0.5, 5e5), _TON),
+    Inquiry('shaft_diameter', 'm', 'diameter of the shaft between its bearings',
+            'by torque and first bending', (5e-3, 3.0), _MM),
+    Inquiry('bearing', '', 'type of the bearings', 'usual for the kind'),
+    Inquiry('bearing_span', 'm', 'distance of the bearings', 'by size', (0.02, 50.0), _MM),
+    Inquiry('overhang', 'm', 'from the last bearing to the middle of an overhung wheel',
+            'by size', (0.02, 20.0), _MM),
+    Inquiry('pedestal', '', 'what the bearings stand on', 'usual for the kind'),
+    Inquiry('machine_mass', 'kg', 'mass of all that stands on the block and does not turn: '
+            'motor, casing, frame', 'by torque and rotor', (1.0, 1e7), _TON),
+    Inquiry('block_width', 'm', 'width of the foundation block, across the shaft',
+            'three times the mass of the machine', (0.1, 60.0), _MM),
+    Inquiry('block_length', 'm', 'its length, along the shaft', 'as its width', (0.1, 60.0),
+            _MM),
+    Inquiry('block_height', 'm', 'its height', 'as its width', (0.1, 20.0), _MM),
+    Inquiry('shaft_height', 'm', 'height of the shaft above the top of the block', 'by size',
+            (0.02, 20.0), _MM),
+    Inquiry('soil', '', 'class of the soil below the block', 'unknown'),
+    Inquiry('shear_wave_velocity', 'm/s', 'velocity of shear waves in it, if measured',
+            'by class', (30.0, 3500.0), (1e3,)),
+    Inquiry('density', 'kg/m^3', 'density of the soil, if measured', 'by class',
+            (800.0, 3500.0), (1e3,)),
+    Inquiry('balance_grade', '', 'balance grade of ISO 21940-11, as in G6.3',
+            'usual for the kind'),
 )
 
 
@@ -185,7 +185,7 @@ def checked(given: Mapping[str, Any]) -> Answers:
     return answers
 
 
-def faults_of(question: Question, value: object) -> list[str]:
+def faults_of(question: Inquiry, value: object) -> list[str]:
     """Return what is wrong with one answer by itself."""
     try:
         answers = Answers.model_validate({**_ANY, question.key: value})
