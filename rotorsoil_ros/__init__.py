@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from rotorsoil_ros.events import Profile
     from rotorsoil_ros.ground.cone import ConeModel
     from rotorsoil_ros.ground.half_space import InfiniteElementModel
+    from rotorsoil_ros.ground.layers.model import ThinLayerModel
+    from rotorsoil_ros.ground.layers.profile import Embedment, Layer, LayeredSoil
     from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil, Soil, SoilModel
     from rotorsoil_ros.ground.table import ComplianceTable
     from rotorsoil_ros.machine.coupled import CoupledModel
@@ -52,11 +54,12 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 __all__ = [
     'Bearing', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison', 'ComplianceTable',
-    'ConeModel', 'CoupledModel', 'CriticalSpeed', 'Disc', 'Foundation', 'InfiniteElementModel',
-    'InputError', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'OutOfTableError',
-    'Pedestal', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response',
-    'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel',
-    'SoilSpread', 'SpeedSource', 'Verdict', 'Wish', 'compare', 'load', 'read_profile',
+    'ConeModel', 'CoupledModel', 'CriticalSpeed', 'Disc', 'Embedment', 'Foundation',
+    'InfiniteElementModel', 'InputError', 'Layer', 'LayeredSoil', 'Machine', 'Matching',
+    'Material', 'NotSolvedError', 'OutOfTableError', 'Pedestal', 'Prediction', 'Predictor',
+    'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor',
+    'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource',
+    'ThinLayerModel', 'Verdict', 'Wish', 'compare', 'load', 'read_profile',
 ]
 
 # Which room a public name lives in.
@@ -69,6 +72,8 @@ _ROOMS = {
     'events': ('Profile',),
     'ground.cone': ('ConeModel',),
     'ground.half_space': ('InfiniteElementModel',),
+    'ground.layers.model': ('ThinLayerModel',),
+    'ground.layers.profile': ('Embedment', 'Layer', 'LayeredSoil'),
     'ground.soil': ('Circle', 'Rectangle', 'RigidSoil', 'Soil', 'SoilModel'),
     'ground.table': ('ComplianceTable',),
     'machine.coupled': ('CoupledModel',),

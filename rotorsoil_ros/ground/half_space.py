@@ -181,8 +181,8 @@ class InfiniteElementModel:
             radius = math.sqrt(radii[sway] * radii[rock])
             coupling = self._entries(omega, radius)[:, 3] / (modulus * radius**2)
             compliance[:, sway, rock] = compliance[:, rock, sway] = sign * coupling
-            _keep_passive(compliance, sway, rock)
-        _keep_passive(compliance, 2, 5)
+            keep_passive(compliance, sway, rock)
+        keep_passive(compliance, 2, 5)
         return compliance
 
     def _strip(self, omega: FloatArray) -> ComplexArray:
@@ -194,7 +194,7 @@ class InfiniteElementModel:
         compliance[:, 0, 0], compliance[:, 2, 2] = entries[:, 0], entries[:, 1]
         compliance[:, 4, 4] = entries[:, 2] / width**2
         compliance[:, 0, 4] = compliance[:, 4, 0] = entries[:, 3] / width
-        _keep_passive(compliance, 0, 4)
+        keep_passive(compliance, 0, 4)
         return compliance
 
 
@@ -210,7 +210,7 @@ def _lengths(contact: Contact, geometry: str) -> FloatArray:
     return np.array([contact.half_width])
 
 
-def _keep_passive(compliance: ComplexArray, first: int, second: int) -> None:
+def keep_passive(compliance: ComplexArray, first: int, second: int) -> None:
     """Limit the losses of two coupled motions so that -Im N stays positive semidefinite."""
     for dof in (first, second):
         diagonal = compliance[:, dof, dof]

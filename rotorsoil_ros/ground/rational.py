@@ -225,7 +225,9 @@ class RationalMatrix:
     @classmethod
     def of(cls, omega: FloatArray, values: ComplexArray) -> 'RationalMatrix':
         """Fit samples (n, d, d) at ascending frequencies (n,)."""
-        chosen, fits = _greedy(omega, values.reshape(len(omega), -1))
+        entries = values.reshape(len(omega), -1)
+        chosen, fits = _greedy(omega, entries, np.ones(entries.shape),
+                               min(_MOST_NODES, len(omega) // 2), _is_enough)
         errors = [worst for worst, _ in fits]
         enough = _TOLERANCE if min(errors) <= _TOLERANCE else max(_ROUGH, 10.0 * min(errors))
         most = next(count for count, worst in enumerate(errors, 1) if worst <= enough)
@@ -290,24 +292,51 @@ def _largest(values: ComplexArray) -> FloatArray:
     return np.asarray(np.abs(values).max(axis=(-2, -1), initial=0.0))
 
 
+def interpolant(
+    omega: FloatArray, values: ComplexArray, *, scale: FloatArray, most: int, tolerance: float,
+) -> RationalMatrix:
+    """
+    Return rational functions with common poles through some samples, close to all others.
+
+    Parameters
+    ----------
+    omega : (n,) float array
+        Frequencies, ascending.
+    values : (n, q) complex array
+        Samples of q functions.
+    scale : (n, q) float array
+        What an error is measured against.
+    most : int
+        Number of nodes at most, less than n.
+    tolerance : float
+        Error of all samples that needs no further node: one more would follow round-off.
+
+    """
+    chosen, fits = _greedy(omega, values, scale, most,
+                           lambda errors: bool(errors) and errors[-1] <= tolerance)
+    nodes = chosen[:len(fits)]
+    return RationalMatrix(omega[nodes], values[nodes], fits[-1][1])
+
+
 def _greedy(
-    omega: FloatArray, entries: ComplexArray,
+    omega: FloatArray, entries: ComplexArray, scale: FloatArray, most: int,
+    is_enough: Callable[[list[float]], bool],
 ) -> tuple[list[int], list[tuple[float, ComplexArray]]]:
     """Return nodes in the order of their choice, and error and weights of 1, 2, ... of them."""
-    error = np.abs(entries - entries.mean(axis=0)).max(axis=1)
+    error = (np.abs(entries - entries.mean(axis=0)) / scale).max(axis=1)
     chosen: list[int] = []
     fits: list[tuple[float, ComplexArray]] = []
-    most = min(_MOST_NODES, len(omega) // 2)
-    while len(fits) < most and not _is_enough([worst for worst, _ in fits]):
+    while len(fits) < most and not is_enough([worst for worst, _ in fits]):
         chosen.append(int(error.argmax()))
         rest = np.delete(np.arange(len(omega)), chosen)
         cauchy = 1.0 / (omega[rest, None] - omega[chosen])
         loewner = (entries[rest, None, :] - entries[chosen]) * cauchy[..., None]
+        loewner /= scale[rest][:, None, :]
         weights = _smallest(loewner.transpose(0, 2, 1).reshape(-1, len(chosen)))
         error = np.zeros(len(omega))
-        error[rest] = np.abs(
+        error[rest] = (np.abs(
             (cauchy * weights) @ entries[chosen] / (cauchy @ weights)[:, None]
-            - entries[rest]).max(axis=1)
+            - entries[rest]) / scale[rest]).max(axis=1)
         fits.append((float(error.max()), weights))
     return chosen, fits
 

@@ -128,7 +128,7 @@ def test_no_contact_gives_energy_even_where_nothing_is_lost(elastic_from_rest, c
 def test_nothing_has_to_be_held_passive_where_radiation_can_be_resolved(
     elastic_from_rest, monkeypatch,
 ):
-    monkeypatch.setattr('rotorsoil_ros.ground.half_space._keep_passive', lambda *_: None)
+    monkeypatch.setattr('rotorsoil_ros.ground.half_space.keep_passive', lambda *_: None)
     model = InfiniteElementModel(ELASTIC, LONG, elastic_from_rest)
     omega = np.geomspace(0.02, 3.0, 200) * ELASTIC.shear_wave_speed / LONG.half_width
     assert np.linalg.eigvalsh(-model.compliance(omega).imag).min() > 0.0

@@ -1,0 +1,118 @@
+"""What is known of layered ground over frequency: rational functions between its cut-offs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.ground.rational import RationalMatrix
+
+ENTRIES = ('xx', 'zz', 'rxrx', 'ryry', 'rzrz', 'x_ry', 'y_rx')
+
+# A few units in the last place lost on the way from rad/s to a0 are not another frequency.
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayeredTable:
+    """
+    Compliance of a massless contact on layered ground, in units of the soil below its base.
+
+    Attributes
+    ----------
+    edges : (p + 1,) float array
+        Ends of the pieces, rising from 0: all but the ends are singular frequencies [-].
+    pieces : tuple of p RationalMatrix
+        Functions of a0 with the entries `ENTRIES`.
+    measured_error : float
+        Largest error of any piece at frequencies that it had not seen, or, where that is larger,
+        its largest change anywhere when they were added to it; relative, of a coupling to the
+        mean of its diagonals.
+    solves, nodes : int
+        Number of exact solves, and of nodes over the depth.
+
+    """
+
+    edges: FloatArray
+    pieces: tuple[RationalMatrix, ...]
+    measured_error: float
+    solves: int
+    nodes: int
+
+    def compliance(self, a0: FloatArray) -> ComplexArray:
+        """
+        Return the dimensionless compliances, (n, 7) over `ENTRIES`.
+
+        Raises
+        ------
+        OutOfTableError
+            If a frequency lies outside the range that was solved.
+
+        """
+        inside = (a0 >= 0.0) & (a0 <= self.edges[-1] * (1.0 + _ROUNDING))
+        if not inside.all():
+            raise OutOfTableError(
+                f'a0 must be in [0, {self.edges[-1]:g}] [-], the range of the table, got '
+                f'{a0[~inside][0]:g}')
+        piece = np.clip(np.searchsorted(self.edges, a0, side='right') - 1, 0,
+                        len(self.pieces) - 1)
+        values = np.zeros((len(a0), len(ENTRIES)), dtype=complex)
+        for index in np.unique(piece):
+            own = piece == index
+            values[own] = self.pieces[index](a0[own].astype(complex))
+        return values
+
+    def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the table as plain arrays, for a file that needs no pickle."""
+        return {
+            'edges': self.edges,
+            'sizes': np.array([len(piece.nodes) for piece in self.pieces]),
+            'support': np.concatenate([piece.nodes for piece in self.pieces]),
+            'values': np.concatenate([piece.values for piece in self.pieces]),
+            'weights': np.concatenate([piece.weights for piece in self.pieces]),
+            'measured_error': np.array(self.measured_error),
+            'solves': np.array(self.solves), 'nodes': np.array(self.nodes),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> 'LayeredTable':
+        """
+        Return the table that `to_arrays` took apart.
+
+        Raises
+        ------
+        RotorSoilError
+            If an array is missing, has the wrong shape or is not finite.
+
+        """
+        try:
+            edges, support = (np.asarray(arrays[name], dtype=float)
+                              for name in ('edges', 'support'))
+            values, weights = (np.asarray(arrays[name], dtype=complex)
+                               for name in ('values', 'weights'))
+            ends = np.cumsum(np.asarray(arrays['sizes'], dtype=int))
+            error = float(arrays['measured_error'])
+            solves, nodes = int(arrays['solves']), int(arrays['nodes'])
+        except (KeyError, TypeError, ValueError) as problem:
+            raise RotorSoilError(f'not a table of layered ground: {problem}') from problem
+        if not (len(edges) == len(ends) + 1 > 1 and values.shape == (len(support), len(ENTRIES))
+                and weights.shape == support.shape == (ends[-1],)
+                and all(np.isfinite(part).all() for part in (edges, support, values, weights))
+                and math.isfinite(error)):
+            raise RotorSoilError('not a table of layered ground: its arrays do not fit')
+        pieces = tuple(map(RationalMatrix, *(np.split(part, ends[:-1])
+                                             for part in (support, values, weights))))
+        return cls(edges, pieces, error, solves, nodes)
+
+
+def entry_scale(values: ComplexArray) -> FloatArray:
+    """Return what an error of each entry is measured against, (n, 7)."""
+    scale = np.abs(values)
+    scale[:, 5] = np.sqrt(scale[:, 0] * scale[:, 3])
+    scale[:, 6] = np.sqrt(scale[:, 0] * scale[:, 2])
+    return np.asarray(scale)
