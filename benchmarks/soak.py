@@ -82,7 +82,7 @@ class Plant:
         judged_by = criteria(
             machine.case, machine.model, machine.case.unbalance, directory / 'cache')
         for name in names:
-            encoder = Encoder(machine.table.channels, Topics.of('', name))
+            encoder = Encoder(name, machine.table.channels, Topics.of('', name))
             monitor = Monitor(name, machine.table, machine.case.unbalance, sinks=[
                 Messenger(encoder, [lambda records: None, self.log.write]), self.log.show])
             monitor.judge.take_criteria(judged_by)

@@ -57,7 +57,7 @@ class Plant:
         machine = Machine.load(CASE, cache_directory=directory)
         self.told: list[Records] = []
         messenger = Messenger(
-            Encoder(machine.table.channels, Topics.of('', 'fan')), [self.told.append])
+            Encoder('fan', machine.table.channels, Topics.of('', 'fan')), [self.told.append])
         self.monitor = Monitor('fan', machine.table, machine.case.unbalance, sinks=[messenger])
         self.monitor.judge.take_criteria(criteria(
             machine.case, machine.model, machine.case.unbalance, directory))

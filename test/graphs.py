@@ -126,10 +126,14 @@ class Bench:
                 if publisher.topic_name in self.heard:
                     self.graph.until(publisher.get_subscription_count, 'matching')
 
-    def call(self, kind, name, request):
+    def ask(self, kind, name, request):
+        """Call a service; return the future of its answer."""
         client = self.probe.create_client(kind, name)
         self.graph.until(client.service_is_ready, name)
-        future = client.call_async(request)
+        return client.call_async(request)
+
+    def call(self, kind, name, request):
+        future = self.ask(kind, name, request)
         self.graph.until(future.done, name)
         return future.result()
 

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+from types import ModuleType, SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -192,6 +193,51 @@ def test_launch_file_is_python():
     for path in (ROOT / 'launch').glob('*.py'):
         compile(path.read_text(), str(path), 'exec')
         assert 'def generate_launch_description(' in path.read_text()
+
+
+@pytest.fixture
+def launched(monkeypatch):
+    """Return what the launch file starts, with stand-ins for packages that pip does not have."""
+    def given(name):
+        return SimpleNamespace(perform=lambda context: context[name])
+
+    stand_ins = {
+        'launch': {'LaunchContext': dict, 'LaunchDescription': list},
+        'launch.actions': {'DeclareLaunchArgument': lambda name, **said: (name, said),
+                           'OpaqueFunction': lambda function: function},
+        'launch.substitutions': {'LaunchConfiguration': given},
+        'launch_ros': {}, 'launch_ros.actions': {'Node': lambda **said: said}}
+    for name, holds in stand_ins.items():
+        module = ModuleType(name)
+        vars(module).update(holds)
+        monkeypatch.setitem(sys.modules, name, module)
+    file = runpy.run_path(str(ROOT / 'launch' / 'rotorsoil.launch.py'))
+    *arguments, start = file['generate_launch_description']()
+    defaults = {name: said['default_value'] for name, said in arguments}
+
+    def run(**asked):
+        [node] = start({**defaults, **asked})
+        return node
+    return run
+
+
+@pytest.mark.parametrize('asked, machine, case', [
+    ({}, 'paper_rotor', 'paper_rotor'), ({'case': 'plant_fan'}, 'plant_fan', 'plant_fan'),
+    ({'machine': 'plant_fan'}, 'plant_fan', 'plant_fan'),
+    ({'case': '{}'}, 'mill_fan_3', '{}'), ({'case': '{}', 'machine': 'fan'}, 'fan', '{}'),
+    ({'case': '/nowhere/Fan 2.yaml'}, 'fan_2', '/nowhere/Fan 2.yaml')])
+def test_a_launched_machine_is_called_as_its_case_says(launched, tmp_path, asked, machine, case):
+    path = tmp_path / 'whatever.yaml'
+    path.write_text('name: Mill fan-3\nsoil: {}\n')
+    node = launched(**{name: value.format(path) for name, value in asked.items()})
+    assert node['parameters'] == [{
+        'machines': [machine], f'{machine}.case': case.format(path), 'log.directory': ''}]
+    assert re.fullmatch('[a-z][a-z0-9_]*', machine)
+
+
+def test_launched_parameters_replace_all_else(launched):
+    node = launched(params='plant.yaml', case='fan.yaml', namespace='/hall_2')
+    assert (node['parameters'], node['namespace']) == (['plant.yaml'], '/hall_2')
 
 
 def test_changelog_is_one_for_this_package():

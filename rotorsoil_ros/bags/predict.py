@@ -101,7 +101,7 @@ def predict(
         partial = out.with_name(f'{out.name}.partial')
         stack.callback(partial.unlink, missing_ok=True)
         log = stack.enter_context(LogFile(partial))
-        encoder = Encoder(machine.table.channels, Topics.of(inputs.namespace, name))
+        encoder = Encoder(name, machine.table.channels, Topics.of(inputs.namespace, name))
         viewer = [stack.enter_context(screen(name))] if screen else []
         monitor = Monitor(name, machine.table, machine.case.unbalance,
                           sinks=[Messenger(encoder, [log.write]), *viewer],

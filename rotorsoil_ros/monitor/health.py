@@ -7,13 +7,21 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.events import Diagnostics, Level, NANOSECONDS
 from rotorsoil_ros.units import rad_s_to_rpm
 
+# Its speed is told and lies below the table, so near to nothing that the machine stands.
+STANDING, STANDSTILL = 'standing', 1e-3
 GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unstable',
         'unresolved')
 FAULTS = (*GAPS, 'malformed', 'velocity_missing', 'stamp_missing')
 REDATED = ('stamp_not_set', 'stamp_far_off')  # answered at the time of reception
 STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
-COUNTED = ('received', 'answered', *FAULTS, 'joint_missing', *REDATED, *STAMPS, 'measured',
-           'samples')
+COUNTED = ('received', 'answered', STANDING, *FAULTS, 'joint_missing', *REDATED, *STAMPS,
+           'measured', 'samples')
+
+
+MOST_SAID = 16
+EXPLAINED = {
+    'stamp_not_set': 'header.stamp is zero: whoever sends the speed does not set it',
+    'stamp_far_off': 'header.stamp jumps by years: the clock of whoever sends is not set'}
 
 
 class Health:
@@ -27,7 +35,11 @@ class Health:
         self.last_speed = math.nan
         self.publishers = 1
         self.standing = ''  # an error of the case itself, whatever comes in
-        self.explanations: dict[str, str] = {}
+        self.misfit = ''  # what somebody sends that nobody can read
+        self.slips: tuple[str, ...] = ()  # of whoever has set this up, whatever comes in
+        self.speed_unit = 'rad_s'
+        self.explanations = dict(EXPLAINED)
+        self._said: set[str] = set()
         self._last_ns: int | None = None
         self._faults = 0
         self._at_tick = self.counts.copy()
@@ -45,6 +57,22 @@ class Health:
     def explain(self, reason: str, text: str) -> None:
         """Say more of a reason: what the reader should know to mend it."""
         self.explanations[reason] = text
+
+    def complaints(self) -> list[str]:
+        """Return what somebody has to mend, from the last tick to now."""
+        deaf = self.misfit and not self._since_tick('received')
+        missing = not self.counts['received'] and self.counts['joint_missing']
+        found = [self.misfit if deaf else '',
+                 self.explanations.get('joint_missing', '') if missing else '',
+                 *(self.explanations.get(reason, '') for reason in (*FAULTS, *REDATED)
+                   if self._since_tick(reason)), *self.slips]
+        return [text for text in dict.fromkeys(found) if text]
+
+    def news(self) -> list[str]:
+        """Return the complaints that were not told before."""
+        found = [text for text in self.complaints() if text not in self._said]
+        self._said |= set(found[:MOST_SAID - len(self._said)])
+        return [text for text in found if text in self._said]
 
     def receive(self, stamp_ns: IntArray, speed: FloatArray) -> None:
         """Count speeds [rad/s] and look whether their stamps [ns] go forward."""
@@ -86,7 +114,7 @@ class Health:
         if not self.counts['received'] or self._silent_s > stale_after_s:
             self.level = Level.STALE
         else:
-            is_well = not self._faults and self.publishers < 2
+            is_well = not self._faults and self.publishers < 2 and not self.slips
             self.level = Level.OK if is_well else Level.WARN
         self.level = self._raised(self.level)
         report = self._report(now_ns)
@@ -111,17 +139,22 @@ class Health:
         if self.standing:
             return self.standing
         if self.level is Level.STALE:
-            if not self.counts['received']:
-                return 'waiting for the first speed'
-            return f'no speed for {self._silent_s:.1f} s'
+            waiting = ('waiting for the first speed' if not self.counts['received'] else
+                       f'no speed for {self._silent_s:.1f} s')
+            return '; '.join([waiting, *self.complaints()])
         if self.level is Level.OK:
+            if self._since_tick(STANDING) == self._since_tick('received') > 0:
+                return 'the machine stands still'
             rate = f', {self._rate_hz:.1f} per second' if self._rate_hz else ''
             return f'every speed is answered{rate}'
+        said = ''
         if unanswered := self._told(FAULTS):
-            return f'without an answer: {unanswered}'
-        if redated := self._told(REDATED):
-            return f'dated on reception: {redated}'
-        return f'{self.publishers} publishers tell the speed'
+            said = f'without an answer: {unanswered}'
+        elif redated := self._told(REDATED):
+            said = f'dated on reception: {redated}'
+        elif self.publishers > 1:
+            said = f'{self.publishers} publishers tell the speed'
+        return '; '.join(filter(None, [said, *self.complaints()]))
 
     def _told(self, reasons: tuple[str, ...]) -> str:
         """Return how often each of some reasons was noted since the last tick."""

@@ -20,11 +20,15 @@ from rotorsoil_ros.events import (
     Sink,
 )
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.monitor.health import Health
+from rotorsoil_ros.monitor.health import Health, STANDING, STANDSTILL
 from rotorsoil_ros.monitor.judge import Judge
 from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.prediction import Prediction
+from rotorsoil_ros.units import rad_s_to_rpm, SPEED_UNITS
 
+# In which a speed is a larger number than in rad/s.
+LARGER_UNITS = {'rpm': 'rpm', 'deg_s': 'deg/s'}
+FAR_ABOVE = 1.5
 NO_ANSWER = complex(np.nan, np.nan)
 
 
@@ -112,6 +116,8 @@ class Monitor:
         found = list(self.judge.tick(now_ns, stale_after_s=stale_after_s))
         parts = tuple(event for event in found if isinstance(event, Diagnostics))
         self._emit_all(event for event in found if not isinstance(event, Diagnostics))
+        self._emit_all(Remark(self.machine, now_ns, Level.WARN, text)
+                       for text in self.health.news())
         health = self.health.tick(now_ns, stale_after_s=stale_after_s)
         self._emit(replace(health, parts=parts) if parts else health)
 
@@ -138,15 +144,34 @@ class Monitor:
             answer = self._predictor.predict(speed[covered])
             self.health.note('answered', len(answer.speed))
             displacement[covered], force[covered] = answer.displacement, answer.force
+        self._suspect_unit(speed)
         return Prediction(speed, displacement, force)
+
+    def _suspect_unit(self, speed: FloatArray) -> None:
+        """Ask back where speeds above the table lie in it in another unit."""
+        lowest, highest = self.table.speed_range
+        # Of a machine that was answered it may be an overspeed, unless it is far above.
+        most = highest * (FAR_ABOVE if self.health.counts['answered'] else 1.0)
+        above = speed[speed > most]
+        if not len(above) or self.health.speed_unit != 'rad_s':
+            return
+        told = float(above[-1])
+        for unit, name in LARGER_UNITS.items():
+            if lowest <= told * SPEED_UNITS[unit] <= highest:
+                self.health.explain('above_table', f'{told:.0f} rad/s is '
+                                    f'{rad_s_to_rpm(told):.0f} rpm; did you send {name}?')
+                return
+        self.health.explanations.pop('above_table', None)
 
     def _reasons(self, speed: FloatArray) -> dict[str, BoolArray]:
         """Tell for each reason which of the speeds have no answer because of it."""
         lowest, highest = self.table.speed_range
         reasons = {'nan': np.isnan(speed), 'infinite': np.isinf(speed)}
         finite = np.isfinite(speed)
-        reasons['negative'] = finite & (speed < 0.0)
-        reasons['below_table'] = finite & (speed >= 0.0) & (speed < lowest)
+        stands = finite & (np.abs(speed) <= STANDSTILL * highest) & (speed < lowest)
+        reasons[STANDING] = stands
+        reasons['negative'] = finite & (speed < 0.0) & ~stands
+        reasons['below_table'] = finite & (speed >= 0.0) & (speed < lowest) & ~stands
         reasons['above_table'] = finite & (speed > highest)
         inside = finite & (speed >= lowest) & (speed <= highest)
         reasons['unstable'] = inside & ~self.table.stability.holds(speed)

@@ -4,29 +4,28 @@ from collections.abc import Collection
 from functools import partial
 from typing import Any
 
-from rcl_interfaces.msg import Log
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64, String
 
 from rotorsoil_ros.case import config
 from rotorsoil_ros.case.loading import reload
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Event, Level, Remark, Sink
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.node.criteria_feed import Bench
+from rotorsoil_ros.node.hearing import greeting, Hearing
+from rotorsoil_ros.node.interfaces import message_class
 from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
+from rotorsoil_ros.units import rad_s_to_rpm
 from rotorsoil_ros.wire.dating import Arrival
-from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE, LOG, STRING
-from rotorsoil_ros.wire.handlers import Inlet, inlet, raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.definitions import IMU, STRING
+from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, raw_channel
 from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
-from rotorsoil_ros.wire.speeds import SpeedSource
 
-TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu, LOG: Log, STRING: String}
 RAW_DEPTH = 1000  # samples kept while the node is busy
 OUTPUT = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -54,18 +53,26 @@ class Watch:
         self._arrival = Arrival(lambda: int(node.get_clock().now().nanoseconds))
         self._topics = self._publish(diagnostics)
         self._shown_channels = machine.table.channels
-        self._rivals: tuple[str, ...] = ()
+        self._told: set[str] = set()
         self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks(),
                                judging=settings.judging(name, machine.case))
-        self._speed_topics: list[str] = []
         self._raw_topics: dict[str, str] = {}
+        self._speed = settings.speed(name)
+        try:
+            self._hearing = Hearing(node, name, self._speed, self._hear_speed)
+        except InputError as error:
+            raise InputError(f'parameter {name}.speed: {error}') from error
         self._subscribe()
         self._reloader = Reloader(
             node, name, check=self._check, load=self._load, take=self.take_machine)
 
     def begin(self, now_ns: int) -> None:
-        """Answer from now on."""
+        """Greet, and answer from now on."""
         self.is_active = True
+        lowest, highest = self.monitor.table.speed_range
+        self._node.get_logger().info(f'{self.name}: ' + greeting(
+            self._hearing, self.monitor.table.channels,
+            (rad_s_to_rpm(lowest), rad_s_to_rpm(highest))))
         self.monitor.begin(now_ns, self._description())
         self._ask()
 
@@ -73,7 +80,7 @@ class Watch:
         """Report the health of the machine; hear sensors among the topics of the graph."""
         if self.is_active:
             self._hear_sensors(topics)
-            self._look_for_rivals()
+            self._look_who_speaks()
             self.monitor.tick(now_ns, stale_after_s=stale_after_s)
 
     def take_unbalance(self, now_ns: int) -> None:
@@ -112,7 +119,7 @@ class Watch:
         return self._machine.table.channels == self._shown_channels
 
     def _sinks(self) -> list[Sink]:
-        encoder = Encoder(self._machine.table.channels, self._topics)
+        encoder = Encoder(self.name, self._machine.table.channels, self._topics)
         outlets = [self._send, self._log.write] if self._log.is_written else [self._send]
         sinks: list[Sink] = [Messenger(encoder, outlets), self._tell]
         return [*sinks, self._log.show] if self._is_shown and self._log.is_shown else sinks
@@ -133,26 +140,25 @@ class Watch:
     def _load(self) -> Machine:
         return reload(self._settings.case_file(self.name), cache_directory=self._settings.cache)
 
-    def _look_for_rivals(self) -> None:
+    def _look_who_speaks(self) -> None:
         """Count who tells the speed; name them when they are several."""
-        count = self._node.count_publishers
-        self.monitor.health.publishers = sum(count(topic) for topic in self._speed_topics)
-        names: tuple[str, ...] = ()
-        if self.monitor.health.publishers > 1:
-            names = tuple(sorted(
-                f'{info.node_namespace.rstrip("/")}/{info.node_name} on {topic}'
-                for topic in self._speed_topics
-                for info in self._node.get_publishers_info_by_topic(topic)))
-            if names != self._rivals:
-                self._node.get_logger().warning(
-                    f'{self.name}: more than one publisher tells its speed: {", ".join(names)}')
-        self._rivals = names
+        health = self.monitor.health
+        health.publishers, health.misfit = self._hearing.look()
+        if rivals := ', '.join(self._hearing.rivals):
+            self._say_once(f'more than one publisher tells its speed: {rivals}')
+
+    def _say_once(self, text: str) -> None:
+        """Say something on the terminal, and nothing if it was said before."""
+        if text not in self._told:
+            self._told.add(text)
+            self._node.get_logger().warning(f'{self.name}: {text}')
 
     def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
         """Create the publishers; return the names that their topics have after remapping."""
         self._own_publishers = [
             self._node.create_lifecycle_publisher(
-                TYPES[kind], f'~/{self.name}/{name}', LATCHED if kind == STRING else OUTPUT)
+                message_class(kind), f'~/{self.name}/{name}',
+                LATCHED if kind == STRING else OUTPUT)
             for name, kind in OWN_TOPICS.items()]
         # Past the lifecycle's own gate, which takes a microsecond: nothing is sent unless active.
         self._publish_on = {publisher.topic_name: partial(Publisher.publish, publisher)
@@ -163,10 +169,8 @@ class Watch:
             diagnostics=diagnostics.topic_name)
 
     def _subscribe(self) -> None:
-        for name, kind in TOPICS.items():
-            topic = self._hear(name, kind, depth=self._settings.value('speed_depth'))
-            if name in SPEED_TOPICS:
-                self._speed_topics.append(topic)
+        for name, kind in MEASURED_TOPICS.items():
+            self._hear(name, kind, depth=self._settings.value('speed_depth'))
         for channel in self._machine.table.channels:
             name = f'measured/{channel}/imu'
             if raw_channel(name):
@@ -177,17 +181,24 @@ class Watch:
         for topic in self._raw_topics.keys() & topics:
             self._hear(self._raw_topics.pop(topic), IMU, depth=RAW_DEPTH)
 
-    def _hear(self, name: str, kind: str, *, depth: int) -> str:
-        """Subscribe to an input; return its topic."""
-        reliability = ReliabilityPolicy[self._settings.value('speed_reliability').upper()]
+    def _hear(self, name: str, kind: str, *, depth: int) -> None:
+        """Subscribe to what is measured."""
         topic = str(self._node.resolve_topic_name(f'{self.name}/{name}'))
-        taken_in = inlet(
-            name, topic, self.monitor, log=self._log.write,
-            speed=SpeedSource(joint=self._settings.value(f'{self.name}.rotor_joint')))
+        self._take(inlet(name, topic, self.monitor, log=self._log.write), topic, kind, depth)
+
+    def _hear_speed(self, name: str, topic: str, kind: str, told: str) -> None:
+        """Subscribe to what tells the speed; it is logged as a plain node would hear it."""
+        plain = topic if self._speed.is_usual else str(
+            self._node.resolve_topic_name(f'{self.name}/joint_states'))
+        self._take(inlet(name, plain, self.monitor, log=self._log.write, speed=self._speed,
+                         message_type=kind, told=told),
+                   topic, kind, self._settings.value('speed_depth'))
+
+    def _take(self, taken_in: Inlet, topic: str, kind: str, depth: int) -> None:
+        reliability = ReliabilityPolicy[self._settings.value('speed_reliability').upper()]
         self._subscriptions.append(self._node.create_subscription(
-            TYPES[kind], topic, partial(self._receive, taken_in),
+            message_class(kind), topic, partial(self._receive, taken_in),
             QoSProfile(depth=depth, reliability=reliability), raw=True))
-        return topic
 
     def _receive(self, taken_in: Inlet, cdr: bytes) -> None:
         if self.is_active:

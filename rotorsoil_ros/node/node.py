@@ -33,7 +33,7 @@ from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import BAD_INPUT, InputError, RotorSoilError
 from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
-from rotorsoil_ros.node.parameters import Settings
+from rotorsoil_ros.node.parameters import described, Settings
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
@@ -42,6 +42,16 @@ PERIOD_S = 1.0
 SPIN_S = 0.1  # EventsExecutor dispatches nothing without a timeout; signals wait for it
 SWITCH_S = 5e-4  # that an answer may wait for the thread that writes the log
 EXECUTORS = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
+
+
+HELP = """usage: rotorsoil_node --ros-args -p machines:="[fan]" -p fan.case:=FAN.yaml [-p ...]
+       rotorsoil_node --ros-args --params-file FILE [-r __ns:=/hall_2]
+
+Publishes what each machine should do at the speed that it reports. Ends with status 0 when it is
+asked to stop, with 2 and one line where a file, a parameter or an argument is wrong.
+
+parameters (default):
+{}"""
 
 
 class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
@@ -139,6 +149,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
                           diagnostics=diagnostics, bench=bench)
             held.callback(watch.destroy)
             self._watches.append(watch)
+        self._hand_out(settings.unknown())
         timer = self.create_timer(
             PERIOD_S / len(machines), self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         held.callback(self.destroy_timer, timer)
@@ -146,6 +157,14 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         settings.is_locked = True
         where = f', log {log.path}' if log.path else ''
         self.get_logger().info(f'watching {", ".join(machines)}{where}')
+
+    def _hand_out(self, slips: Sequence[str]) -> None:
+        """Let each machine tell what was set for it under a name that no parameter has."""
+        for number, watch in enumerate(self._watches):
+            others = [f'parameter {each.name}.' for each in self._watches if each is not watch]
+            watch.monitor.health.slips = tuple(
+                slip for slip in slips if slip.startswith(f'parameter {watch.name}.')
+                or (number == 0 and not slip.startswith(tuple(others))))
 
     def _load(self) -> dict[str, Machine]:
         """Load every machine, each case file once."""
@@ -301,6 +320,11 @@ def _refused_by_ros() -> Iterator[None]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until it is asked to stop; return 0, or 2 where it could not start."""
+    given = list(sys.argv if arguments is None else arguments)
+    plain = given[1:given.index('--ros-args')] if '--ros-args' in given else given[1:]
+    if {'-h', '--help'} & set(plain):
+        sys.stdout.write(HELP.format(described()) + '\n')
+        return 0
     stop = Stop()
     with ExitStack() as stack:
         try:

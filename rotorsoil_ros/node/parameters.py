@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from importlib.util import find_spec
 import math
 from pathlib import Path
@@ -23,12 +24,14 @@ from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.rules import Judging, Matching
-from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.speeds import ROTOR_JOINT
+from rotorsoil_ros.units import rpm_to_rad_s, SPEED_UNITS
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedSource, USUAL
 
 Rule: TypeAlias = Callable[[Any], str]
 
 LARGEST_MOMENT = 1e3  # [kg m]
+SHIPPED = Path(__file__).parents[1] / 'config'
+OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
 
 
 def number(*, unit: str, lowest: float = -math.inf, highest: float = math.inf) -> Rule:
@@ -156,9 +159,22 @@ OWN = {
         'new ones, zero: they never do', 'MiB', span=(0.0, 1e9)),
 }
 OF_MACHINE = {
-    'case': Setting('', 'Case file of the machine (YAML).'),
+    'case': Setting('', 'Case file of the machine (YAML), or the name of a shipped case.'),
     'rotor_joint': Setting(
-        ROTOR_JOINT, 'Joint of joint_states whose velocity is the rotor speed [rad/s].'),
+        ROTOR_JOINT, 'Joint of joint_states whose velocity is the rotor speed.'),
+    'speed.topic': Setting(
+        USUAL.topic, 'Topic of the speed; empty: joint_states and rotor/speed of the machine.'),
+    'speed.type': Setting(
+        USUAL.type, 'Type of its messages, as in std_msgs/msg/Int32; empty: whatever is '
+        'published there.'),
+    'speed.field': Setting(
+        USUAL.field, 'Number in the message that is the speed, as in twist.angular.z or '
+        'velocity[2]; empty: the velocity of the joint, or the only number.'),
+    'speed.unit': Setting(
+        USUAL.unit, f'Unit of the number: {", ".join(SPEED_UNITS)}.', choice(*SPEED_UNITS)),
+    'speed.ratio': Setting(
+        USUAL.ratio, 'Turns of the rotor for one turn of what is told; negative where it counts '
+        'backwards.', number(unit='turns per turn')),
     'slow_roll_rpm': quantity(
         0.0, 'Speed whose measured vector is runout and is subtracted, zero: none', 'rpm',
         span=(0.0, 1e6)),
@@ -176,6 +192,17 @@ def of_unbalance(value: complex) -> dict[str, Setting]:
             'Phase of the unbalance; the next message uses it [rad].', number(unit='rad'),
             acts_at_once=True),
     }
+
+
+def described() -> str:
+    """Return every parameter with its default and what it is, for a terminal."""
+    lines = []
+    for prefix, settings in (('', OWN), ('<machine>.', OF_MACHINE), (
+            '<machine>.unbalance.<disc>.', of_unbalance(0j))):
+        for name, setting in settings.items():
+            default = 'as in the case' if 'unbalance' in prefix else repr(setting.default)
+            lines.append(f'  {prefix}{name} ({default})\n      {setting.meaning}')
+    return '\n'.join(lines)
 
 
 class Settings:
@@ -205,6 +232,16 @@ class Settings:
             raise InputError(f'parameter {name}: {fault}')
         return value
 
+    def unknown(self) -> list[str]:
+        """Return what was set under a name that no parameter has, with the near one."""
+        told = []
+        for name in self._node._parameter_overrides:
+            if name not in self._known and name.split('.')[0] not in OF_ROS:
+                near = get_close_matches(name, self._known, n=1)
+                told.append(f'parameter {name} is not known'
+                            + (f'; did you mean {near[0]}?' if near else ''))
+        return told
+
     def check(self) -> None:
         """Raise InputError at the first value that breaks its rule."""
         for name in self._known:
@@ -223,12 +260,25 @@ class Settings:
         path = self.value(f'{machine}.case')
         if not path:
             raise InputError(f'parameter {machine}.case: must be the path of a case file')
-        return Path(path).expanduser()
+        shipped = SHIPPED / f'{path}.yaml'
+        return shipped if re.fullmatch(r'\w+', path) and shipped.is_file() else (
+            Path(path).expanduser())
 
     @property
     def cache(self) -> Path | None:
         """Directory of the cache, None for the usual one."""
         return Path(self.value('cache')).expanduser() if self.value('cache') else None
+
+    def speed(self, machine: str) -> SpeedSource:
+        """Return what tells the speed of a machine."""
+        said = {name: self.value(f'{machine}.speed.{name}')
+                for name in ('topic', 'type', 'field', 'unit')}
+        try:
+            return SpeedSource(
+                ratio=float(self.value(f'{machine}.speed.ratio')),
+                joint=self.value(f'{machine}.rotor_joint'), **said)
+        except InputError as error:
+            raise InputError(f'parameter {machine}.speed: {error}') from error
 
     def judging(self, machine: str, case: Case) -> Judging:
         """Return how measurements of a machine are held against its predictions."""

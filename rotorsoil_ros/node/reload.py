@@ -16,12 +16,11 @@ RELOAD_GLANCE_S = 0.05
 
 class Reloader:
     """
-    The service `~/<machine>/reload`.
+    The service `~/<machine>/reload`, which answers when the outcome is known.
 
     A case file that is wrong is refused at once. The table of one that is right is computed by
     another process, for which a thread waits; the executor only swaps what is ready, so that a
-    speed is answered from the old case or from the new one. EventsExecutor knows no coroutines
-    in services: the answer comes before the swap, which the log and the latched model tell.
+    speed is answered from the old case or from the new one.
     """
 
     def __init__(
@@ -31,13 +30,19 @@ class Reloader:
         self._node, self._name = node, name
         self._check, self._load, self._take = check, load, take
         self._errand: Errand[Machine] | None = None
+        self._asked: tuple[Any, Any] | None = None  # response and header of who waits
         self._timer = node.create_timer(
             RELOAD_GLANCE_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
         self._service = node.create_service(Trigger, f'~/{name}/reload', self._serve)
+        # EventsExecutor knows no coroutines: what every executor calls to answer is held back.
+        self._answer = self._service.send_response
+        self._service.send_response = self._send
 
     def destroy(self) -> None:
-        """Leave the graph."""
+        """Leave the graph; who waits is told."""
+        if self._asked is not None:
+            self._reply(f'{self._name}: the node was stopped or cleaned up; the old case stays')
         self._node.destroy_service(self._service)
         self._node.destroy_timer(self._timer)
 
@@ -57,9 +62,21 @@ class Reloader:
             return response
         self._errand = errand
         self._timer.reset()
-        response.success = True
-        response.message = f'~/{self._name}/model will tell when the new case answers'
         return response
+
+    def _send(self, response: Any, header: Any) -> None:
+        """Answer, unless the outcome is not known yet."""
+        if response.message:
+            self._answer(response, header)
+        else:
+            self._asked = response, header
+
+    def _reply(self, text: str, *, is_done: bool = False) -> None:
+        """Answer who waits."""
+        if self._asked is not None:
+            (response, header), self._asked = self._asked, None
+            response.success, response.message = is_done, text
+            self._answer(response, header)
 
     def _look(self) -> None:
         """Swap what was loaded."""
@@ -68,6 +85,10 @@ class Reloader:
         errand, self._errand = self._errand, None
         self._timer.cancel()
         if errand.result is not None:
-            self._node.get_logger().info(self._take(errand.result))
+            said = self._take(errand.result)
+            self._node.get_logger().info(said)
+            self._reply(said, is_done=True)
         else:
-            self._node.get_logger().error(f'{errand.failure}; the old case stays')
+            said = f'{errand.failure}; the old case stays'
+            self._node.get_logger().error(said)
+            self._reply(said)

@@ -50,6 +50,7 @@ class SpeedInlet:
         self._monitor = monitor
         self._log = log
         self._writer = None if source.is_usual else JointStateWriter([ROTOR_JOINT])
+        monitor.health.speed_unit = source.unit
         self._reader = SpeedReader(message_type, source, note=monitor.health.note,
                                    explain=monitor.health.explain, told=told)
 

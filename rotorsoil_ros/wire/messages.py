@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import (
     Band,
     Compared,
@@ -33,7 +34,7 @@ MOST_LAYOUTS = 64  # sets of channels that are measured together; more than that
 # Topics of a machine below the node's name, and their types.
 OWN_TOPICS = {
     'amplitude': JOINT_STATE, 'phase': JOINT_STATE, 'amplitude_low': JOINT_STATE,
-    'amplitude_high': JOINT_STATE, 'residual': JOINT_STATE,
+    'amplitude_high': JOINT_STATE, 'velocity_rms': JOINT_STATE, 'residual': JOINT_STATE,
     'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
     'model': STRING}
 
@@ -62,6 +63,7 @@ class Topics:
     phase: str
     amplitude_low: str
     amplitude_high: str
+    velocity_rms: str
     residual: str
     demodulated_amplitude: str
     demodulated_phase: str
@@ -103,12 +105,14 @@ class JointStateWriter:
     Fill JointStates of constant names, n at a time.
 
     The names never change, so one message is encoded, once, and only the numbers between its
-    constant bytes are replaced: the same message at a tenth of the cost.
+    constant bytes are replaced: the same message at a tenth of the cost. Whose they are stands
+    in `header.frame_id`.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], machine: str = '') -> None:
         blank = [math.nan] * len(names)
-        template = encode(JOINT_STATE, {'name': names, **dict.fromkeys(ARRAYS, blank)})
+        template = encode(JOINT_STATE, {
+            'header': {'frame_id': machine}, 'name': names, **dict.fromkeys(ARRAYS, blank)})
         layout = Layout.of(JOINT_STATE, template)
         arrays = [layout.span(name) for name in ARRAYS]
         starts = [at.start for at in (STAMP, *arrays)] + [layout.size]
@@ -138,11 +142,27 @@ class JointStateWriter:
 
 
 class Encoder:
-    """Say the events of one machine in ROS messages."""
+    """
+    Say the events of one machine in ROS messages.
 
-    def __init__(self, channels: Sequence[str], topics: Topics) -> None:
-        self._topics = topics
-        self._joint_states = JointStateWriter(channels)
+    Parameters
+    ----------
+    machine : str
+        Its name.
+    channels : sequence of Channel
+        What is predicted of it.
+    topics : Topics
+        Where.
+
+    """
+
+    def __init__(self, machine: str, channels: Sequence[Channel], topics: Topics) -> None:
+        self._machine, self._topics = machine, topics
+        self._joint_states = JointStateWriter(channels, machine)
+        self._housings = [column for column, channel in enumerate(channels)
+                          if channel.is_housing]
+        self._velocities = JointStateWriter([channels[column] for column in self._housings],
+                                            machine)
         self._writers: dict[tuple[str, ...], JointStateWriter] = {}
 
     def encode(self, event: Event) -> Iterator[Records]:
@@ -171,10 +191,13 @@ class Encoder:
         stamps, topics = event.stamp_ns.tolist(), self._topics
         write = self._joint_states.write_parts
         # The amplitude is under way before the phase is even computed.
-        yield Records(topics.amplitude, JOINT_STATE, stamps,
-                      write(stamps, *moduli(event.prediction)))
+        sizes, velocity = moduli(event.prediction)
+        yield Records(topics.amplitude, JOINT_STATE, stamps, write(stamps, sizes, velocity))
         yield Records(topics.phase, JOINT_STATE, stamps, write(stamps, *phases(event.prediction)))
-
+        if self._housings:
+            rms = velocity[:, self._housings] / math.sqrt(2.0)
+            yield Records(topics.velocity_rms, JOINT_STATE, stamps, self._velocities.write_parts(
+                stamps, np.full((len(rms), 2, rms.shape[1]), np.nan), rms))
 
     def _band(self, event: Band) -> Iterator[Records]:
         stamps, speed = event.stamp_ns.tolist(), event.speed[:, None]
@@ -202,7 +225,7 @@ class Encoder:
         if writer is None:
             if len(self._writers) >= MOST_LAYOUTS:
                 self._writers.clear()
-            writer = self._writers[names] = JointStateWriter(names)
+            writer = self._writers[names] = JointStateWriter(names, self._machine)
         stamps = stamp_ns.tolist()
         outer = np.stack([position, np.full(position.shape, np.nan)], axis=1)
         return Records(topic, JOINT_STATE, stamps, writer.write_parts(stamps, outer, velocity))

@@ -82,7 +82,8 @@ def test_the_log_holds_profile_answers_model_and_diagnostics(tmp_path, machine, 
                  if connection.topic == '/rotorsoil/fan/amplitude']
     assert counts.pop('/diagnostics') >= 2
     assert counts == {'/fan/joint_states': 2501, '/rotorsoil/fan/amplitude': 2501,
-                      '/rotorsoil/fan/phase': 2501, '/rotorsoil/fan/model': 1,
+                      '/rotorsoil/fan/phase': 2501, '/rotorsoil/fan/velocity_rms': 2501,
+                      '/rotorsoil/fan/model': 1,
                       '/rotorsoil/fan/amplitude_low': 250, '/rotorsoil/fan/amplitude_high': 250}
     assert times == stamps.tolist()
 

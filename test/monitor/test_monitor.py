@@ -41,8 +41,8 @@ def test_answer_is_that_of_the_table_at_the_stamp_of_the_speed(watched, machine)
 
 
 @pytest.mark.parametrize('speed, reason', [
-    (math.nan, 'nan'), (math.inf, 'infinite'), (-math.inf, 'infinite'), (-1e-9, 'negative'),
-    (0.0, 'below_table'), (6.28, 'below_table'), (942.48, 'above_table'), (1e300, 'above_table')])
+    (math.nan, 'nan'), (math.inf, 'infinite'), (-math.inf, 'infinite'), (-1.0, 'negative'),
+    (-1e-9, 'standing'), (0.0, 'standing'), (6.28, 'below_table'), (942.48, 'above_table'), (1e300, 'above_table')])
 def test_a_gap_is_counted_by_its_reason_and_answered_with_nan(watched, speed, reason):
     monitor, events = watched
     tell(monitor, COVERED, speed, COVERED)
@@ -130,10 +130,26 @@ def test_a_gap_warns_at_once_and_only_once_until_a_tick_without_one(watched):
         tell(monitor, 2000.0, COVERED, at=step)
     assert levels(events) == [Level.OK, Level.WARN]
     monitor.tick(SECOND, stale_after_s=3.0)
-    assert of_type(events, Diagnostics)[-1].summary == 'without an answer: 5 above table'
+    assert of_type(events, Diagnostics)[-1].summary == (
+        'without an answer: 5 above table; 2000 rad/s is 19099 rpm; did you send rpm?')
     tell(monitor, COVERED)
     monitor.tick(2 * SECOND, stale_after_s=3.0)
     assert levels(events) == [Level.OK, Level.WARN, Level.WARN, Level.OK]
+
+
+def test_an_overspeed_is_not_taken_for_another_unit(watched):
+    monitor, events = watched
+    tell(monitor, COVERED, 1000.0)
+    monitor.tick(SECOND, stale_after_s=3.0)
+    assert of_type(events, Diagnostics)[-1].summary == 'without an answer: 1 above table'
+
+
+def test_degrees_per_second_are_asked_back_and_what_fits_no_unit_is_not(watched):
+    monitor, events = watched
+    tell(monitor, 17_188.0)  # 300 rad/s
+    assert monitor.health.complaints() == ['17188 rad/s is 164133 rpm; did you send deg/s?']
+    tell(monitor, 1e9)
+    assert monitor.health.complaints() == []
 
 
 def test_rate_counts_the_speeds_of_the_last_period(watched):

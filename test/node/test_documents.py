@@ -39,14 +39,17 @@ def test_the_security_policy_is_exactly_for_what_the_node_has(bench: Bench):
 
 def test_the_example_of_parameters_names_only_parameters_of_the_node():
     example = yaml.safe_load((ROOT / 'launch' / 'rotorsoil.yaml').read_text())
-    given = example['rotorsoil']['ros__parameters']
+    given = example['/**']['ros__parameters']
     machines = {name: given.pop(name) for name in given['machines']}
     for name, value in given.items():
         if isinstance(value, dict):
             assert all(not OWN[f'{name}.{key}'].fault(entry) for key, entry in value.items())
         else:
             assert not OWN[name].fault(value)
-    assert all(set(machine) <= set(OF_MACHINE) for machine in machines.values())
+    for machine in machines.values():
+        speed = {f'speed.{name}': value for name, value in machine.pop('speed', {}).items()}
+        assert all(not OF_MACHINE[name].fault(value)
+                   for name, value in {**machine, **speed}.items())
 
 
 def test_every_parameter_is_told_in_the_documents():

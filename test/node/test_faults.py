@@ -50,15 +50,18 @@ def test_a_case_is_reloaded_while_speeds_are_answered(bench, case, machine):
     node.set_parameters([Parameter('fan.unbalance.disc_2.moment', value=2e-5)])
     old = ask(bench, publish, amplitude, 300.0, 0)
     case.write_text(case.read_text().replace('mass: 42.0', 'mass: 420.0'))
-    answer, asked = reload(bench), 0
-    assert answer.success, answer.message
-    assert not reload(bench).success  # one is under way
-    answered = [old]
-    while answered[-1].position == old.position:  # it computes, and speeds are answered
+    reloading = bench.ask(Trigger, '/rotorsoil/fan/reload', Trigger.Request())
+    bench.graph.until(lambda: node._watches[0]._reloader._errand, 'the errand')
+    assert reload(bench).message.endswith('a reload is under way')
+    asked = 0
+    while not reloading.done():  # it computes, and speeds are answered
         asked += 1
-        answered.append(ask(bench, publish, amplitude, 300.0, asked))
+        ask(bench, publish, amplitude, 300.0, asked)
     assert asked > 5
-    new = answered[-1]
+    assert reloading.result().success
+    assert reloading.result().message.startswith(f'fan: reloaded {case}')
+    new = ask(bench, publish, amplitude, 300.0, asked + 1)  # what is answered has happened
+    assert new.position != old.position
     assert node.get_parameter('fan.unbalance.disc_2.moment').value == 2e-5  # what was set stays
     new_key = node._watches[0].monitor.table.key
     assert new_key != machine.table.key
@@ -83,6 +86,25 @@ def test_a_case_that_is_wrong_is_refused_and_the_old_one_stays(bench, case):
     assert ask(bench, publish, amplitude, 300.0, 1).position == old.position
 
 
+def test_who_waits_for_a_reload_is_told_when_the_case_cannot_be_solved(bench, case):
+    bench.active('fan', fan__case=str(case))
+    case.write_text(case.read_text().replace('model: cone', 'model: nothing'))
+    answer = reload(bench)
+    assert not answer.success
+    assert answer.message.endswith('the old case stays')
+
+
+def test_who_waits_for_a_reload_is_told_when_the_node_is_cleaned_up(bench, case):
+    node = bench.active('fan', fan__case=str(case))
+    case.write_text(case.read_text().replace('mass: 42.0', 'mass: 421.0'))
+    reloading = bench.ask(Trigger, '/rotorsoil/fan/reload', Trigger.Request())
+    bench.graph.until(lambda: node._watches[0]._reloader._asked, 'who waits')
+    node.release()
+    bench.graph.until(reloading.done, 'the answer')
+    assert not reloading.result().success
+    assert reloading.result().message.endswith('the old case stays')
+
+
 def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, case, case_file):
     graph.executor.shutdown()
     graph.executor = SingleThreadedExecutor(context=graph.context)
@@ -91,7 +113,7 @@ def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, c
     node = bench.active('fan', fan__case=str(case))
     case.write_text(case.read_text().replace('disc_2', 'wheel'))
     assert reload(bench).success
-    bench.graph.until(lambda: 'wheel_x' in node._watches[0].monitor.table.channels, 'the swap')
+    assert 'wheel_x' in node._watches[0].monitor.table.channels
     assert node.has_parameter('fan.unbalance.wheel.moment')
     assert not node.has_parameter('fan.unbalance.disc_2.moment')
     amplitude, _ = bench.answers()

@@ -121,7 +121,7 @@ def test_whatever_is_measured_in_whatever_order_is_judged_without_a_traceback(
     events = []
     monitor = Monitor('m', machine.table, machine.case.unbalance, sinks=[events.append])
     monitor.judge.take_criteria(basis())
-    encoder = Encoder(machine.table.channels, Topics.of('', 'm'))
+    encoder = Encoder('m', machine.table.channels, Topics.of('', 'm'))
     for kind, stamp, *rest in steps:
         at = np.array([stamp])
         if kind == 'speed':

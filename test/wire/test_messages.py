@@ -11,6 +11,7 @@ from rosbags.typesys import get_typestore, Stores
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Diagnostics, Level, Measured, Model, Predicted
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.wire.messages import (
@@ -22,7 +23,7 @@ from rotorsoil_ros.wire.messages import (
     Topics,
 )
 
-NAMES = ['a_x', 'bearing_1_journal_z', 'c']
+NAMES = [Channel.parse(name) for name in ('a_x', 'bearing_1_housing_z', 'c')]
 STAMP = 1_700_000_000_000_000_001  # a stamp in seconds as a double would lose the 1 ns
 
 
@@ -76,10 +77,11 @@ def test_the_same_message_has_the_same_bytes_in_every_process():
 
 def test_amplitude_and_phase_carry_displacement_velocity_and_force():
     told = event(4)
-    amplitude, phase = Encoder(NAMES, Topics.of('', 'm')).encode(told)
+    amplitude, phase, velocity = Encoder('m', NAMES, Topics.of('', 'm')).encode(told)
     assert amplitude.topic == '/rotorsoil/m/amplitude'
     assert phase.topic == '/rotorsoil/m/phase'
     assert list(amplitude.log_time_ns) == told.stamp_ns.tolist()
+    assert velocity.topic == '/rotorsoil/m/velocity_rms'
     vectors = {'position': told.prediction.displacement, 'velocity': told.prediction.velocity,
                'effort': told.prediction.force}
     for row in range(4):
@@ -87,6 +89,12 @@ def test_amplitude_and_phase_carry_displacement_velocity_and_force():
         angle = deserialize_message(phase.payloads[row], JointState)
         assert size.header.stamp.nanosec == (STAMP + row) % 10**9
         assert angle.name == NAMES
+        assert size.header.frame_id == angle.header.frame_id == 'm'
+        housing = deserialize_message(velocity.payloads[row], JointState)
+        assert (housing.name, housing.header) == (NAMES[1:2], size.header)
+        assert housing.velocity[0] == pytest.approx(
+            abs(told.prediction.velocity[row, 1]) / math.sqrt(2.0), rel=1e-15)
+        assert np.isnan([*housing.position, *housing.effort]).all()
         for name, vector in vectors.items():  # 1e-15: |X| and arg X are rounded once more
             np.testing.assert_allclose(getattr(size, name), np.abs(vector[row]), rtol=1e-15)
             np.testing.assert_allclose(
@@ -95,7 +103,7 @@ def test_amplitude_and_phase_carry_displacement_velocity_and_force():
 
 @pytest.mark.parametrize('count', [2, 7, 64, 1000])
 def test_one_speed_gives_the_bits_that_many_give(count):
-    encoder = Encoder(NAMES, Topics.of('', 'm'))
+    encoder = Encoder('m', NAMES, Topics.of('', 'm'))
     many = [records.payloads for records in encoder.encode(event(count))]
     prediction = random_prediction(count, len(NAMES))
     for row in range(count):
@@ -115,9 +123,16 @@ def test_moduli_and_phases_do_not_depend_on_the_neighbours(width):
                 assert one.tobytes() == all_of_them[row].tobytes()
 
 
+def test_a_machine_without_housings_tells_no_velocity_of_them():
+    encoder = Encoder('m', NAMES[:1], Topics.of('', 'm'))
+    told = Predicted('m', np.array([STAMP]), random_prediction(1, 1))
+    assert [records.topic for records in encoder.encode(told)] == [
+        '/rotorsoil/m/amplitude', '/rotorsoil/m/phase']
+
+
 def test_a_measurement_needs_no_message_because_it_came_as_one():
     told = Measured('m', 'phase', np.array([STAMP]), ('a_x',), *np.zeros((2, 1, 1)))
-    assert list(Encoder(NAMES, Topics.of('', 'm')).encode(told)) == []
+    assert list(Encoder('m', NAMES, Topics.of('', 'm')).encode(told)) == []
 
 
 def test_diagnostics_are_plain_decimals_with_a_level_of_one_byte():
@@ -135,7 +150,7 @@ def test_diagnostics_are_plain_decimals_with_a_level_of_one_byte():
 
 def test_model_is_json_and_latched():
     told = Model('m', STAMP, {'case': 'paper_rotor', 'channels': NAMES})
-    records, = Encoder(NAMES, Topics.of('/plant', 'm')).encode(told)
+    records, = Encoder('m', NAMES, Topics.of('/plant', 'm')).encode(told)
     assert records.topic == '/plant/rotorsoil/m/model'
     assert records.latched
     assert json.loads(deserialize_message(records.payloads[0], String).data) == told.description
