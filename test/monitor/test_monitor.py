@@ -42,7 +42,8 @@ def test_answer_is_that_of_the_table_at_the_stamp_of_the_speed(watched, machine)
 
 @pytest.mark.parametrize('speed, reason', [
     (math.nan, 'nan'), (math.inf, 'infinite'), (-math.inf, 'infinite'), (-1.0, 'negative'),
-    (-1e-9, 'standing'), (0.0, 'standing'), (6.28, 'below_table'), (942.48, 'above_table'), (1e300, 'above_table')])
+    (-1e-9, 'standing'), (0.0, 'standing'), (6.28, 'below_table'), (942.48, 'above_table'),
+    (1e300, 'above_table')])
 def test_a_gap_is_counted_by_its_reason_and_answered_with_nan(watched, speed, reason):
     monitor, events = watched
     tell(monitor, COVERED, speed, COVERED)
@@ -145,7 +146,7 @@ def test_an_overspeed_is_not_taken_for_another_unit(watched):
 
 
 def test_degrees_per_second_are_asked_back_and_what_fits_no_unit_is_not(watched):
-    monitor, events = watched
+    monitor, _ = watched
     tell(monitor, 17_188.0)  # 300 rad/s
     assert monitor.health.complaints() == ['17188 rad/s is 164133 rpm; did you send deg/s?']
     tell(monitor, 1e9)
