@@ -29,10 +29,13 @@ if TYPE_CHECKING:
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
     from rotorsoil_ros.events import Profile
+    from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+    from rotorsoil_ros.ground.boundary.site import Site
     from rotorsoil_ros.ground.cone import ConeModel
     from rotorsoil_ros.ground.half_space import InfiniteElementModel
     from rotorsoil_ros.ground.layers.model import ThinLayerModel
     from rotorsoil_ros.ground.layers.profile import Embedment, Layer, LayeredSoil
+    from rotorsoil_ros.ground.plan import Part, Plan
     from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil, Soil, SoilModel
     from rotorsoil_ros.ground.table import ComplianceTable
     from rotorsoil_ros.machine.coupled import CoupledModel
@@ -53,13 +56,14 @@ if TYPE_CHECKING:
 
 __version__ = '0.1.0'
 __all__ = [
-    'Bearing', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison', 'ComplianceTable',
-    'ConeModel', 'CoupledModel', 'CriticalSpeed', 'Disc', 'Embedment', 'Foundation',
-    'InfiniteElementModel', 'InputError', 'Layer', 'LayeredSoil', 'Machine', 'Matching',
-    'Material', 'NotSolvedError', 'OutOfTableError', 'Pedestal', 'Prediction', 'Predictor',
-    'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor',
-    'RotorSoilError', 'ShaftSection', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource',
-    'ThinLayerModel', 'Verdict', 'Wish', 'compare', 'load', 'read_profile',
+    'Bearing', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison',
+    'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'Disc', 'Embedment',
+    'Foundation', 'InfiniteElementModel', 'InputError', 'Layer', 'LayeredSoil', 'Machine',
+    'Matching', 'Material', 'NotSolvedError', 'OutOfTableError', 'Part', 'Pedestal', 'Plan',
+    'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable',
+    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel',
+    'SoilSpread', 'SpeedSource', 'ThinLayerModel', 'Verdict', 'Wish', 'compare', 'load',
+    'read_profile',
 ]
 
 # Which room a public name lives in.
@@ -70,10 +74,13 @@ _ROOMS = {
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
     'events': ('Profile',),
+    'ground.boundary.site': ('Site',),
+    'ground.boundary.model': ('BoundaryElementModel',),
     'ground.cone': ('ConeModel',),
     'ground.half_space': ('InfiniteElementModel',),
     'ground.layers.model': ('ThinLayerModel',),
     'ground.layers.profile': ('Embedment', 'Layer', 'LayeredSoil'),
+    'ground.plan': ('Part', 'Plan'),
     'ground.soil': ('Circle', 'Rectangle', 'RigidSoil', 'Soil', 'SoilModel'),
     'ground.table': ('ComplianceTable',),
     'machine.coupled': ('CoupledModel',),

@@ -9,7 +9,7 @@ from matplotlib.patches import Circle as Round, Polygon, Rectangle as Box
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.ground.soil import Circle
+from rotorsoil_ros.ground.soil import extents
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.rotor.disc import Disc
@@ -224,13 +224,13 @@ def _foot(case: Case, bearing: Bearing) -> float:
 
 
 def _half_width(block: Foundation) -> float:
-    contact = block.contact
-    return contact.radius if isinstance(contact, Circle) else contact.half_width
+    (left, right), _ = extents(block.contact)
+    return 0.5 * (right - left)
 
 
 def _half_length(block: Foundation) -> float:
-    contact = block.contact
-    return contact.radius if isinstance(contact, Circle) else contact.half_length
+    _, (first, last) = extents(block.contact)
+    return 0.5 * (last - first)
 
 
 def _cylinder(disc: Disc) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.ground.soil import Circle, Contact, SoilModel
+from rotorsoil_ros.ground.soil import Circle, Contact, extents, SoilModel
 
 # Largest error of any stiffness where discs of equal area and second moment stand for a welded
 # rectangle, over a0 up to 3.8 and nu 0.25 to 1/3, against rigorous solutions of the rectangle:
@@ -48,9 +48,7 @@ class StifferGround:
 
 def side_ratio(contact: Contact) -> float:
     """Return length over width of a contact, at least 1."""
-    if isinstance(contact, Circle):
-        return 1.0
-    sides = contact.half_width, contact.half_length
+    sides = [last - first for first, last in extents(contact)]
     return max(sides) / min(sides)
 
 
@@ -98,7 +96,8 @@ def gap(one: Contact, other: Contact, *, distance: float) -> float:
 
 
 def _reach(contact: Contact) -> float:
-    return contact.radius if isinstance(contact, Circle) else contact.half_length
+    _, (first, last) = extents(contact)
+    return 0.5 * (last - first)
 
 
 def neglected_coupling(one: Contact, other: Contact, *, distance: float) -> tuple[float, float]:

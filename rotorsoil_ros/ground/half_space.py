@@ -13,7 +13,7 @@ from rotorsoil_ros.ground.elements.table import (
     ROUNDING,
     standard_range,
 )
-from rotorsoil_ros.ground.soil import Circle, Contact, equivalent_radii, Soil
+from rotorsoil_ros.ground.soil import Circle, Contact, equivalent_radii, Rectangle, Soil
 
 # Part of every cache key: raise it when mesh, functions or fit change what a table says.
 ELEMENTS_ALGORITHM = 1
@@ -187,7 +187,7 @@ class InfiniteElementModel:
 
     def _strip(self, omega: FloatArray) -> ComplexArray:
         contact = self.contact
-        assert not isinstance(contact, Circle)
+        assert isinstance(contact, Rectangle)
         width, length = contact.half_width, 2.0 * contact.half_length
         entries = self._entries(omega, width) / (self.soil.shear_modulus * length)
         compliance = np.zeros((omega.size, 6, 6), dtype=complex)
@@ -203,10 +203,10 @@ def _lengths(contact: Contact, geometry: str) -> FloatArray:
     require_kind(geometry, 0.0, 0.0)
     if geometry == 'disc':
         return equivalent_radii(contact)
-    if isinstance(contact, Circle):
-        raise RotorSoilError(
-            f'geometry {geometry} must have a rectangular contact, got a circle of radius '
-            f'{contact.radius:g} m')
+    if not isinstance(contact, Rectangle):
+        what = (f'a circle of radius {contact.radius:g} m' if isinstance(contact, Circle)
+                else f'a plan of {len(contact.parts)} parts')
+        raise RotorSoilError(f'geometry {geometry} must have a rectangular contact, got {what}')
     return np.array([contact.half_width])
 
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.soil import Contact, Soil, SoilModel
+from rotorsoil_ros.ground.soil import Contact, Soil, SoilModel, static_scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +43,14 @@ class NeighbourSoil:
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
-        before, after = self.solved.soil.poisson_ratio, self.poisson_ratio
-        sliding = (2.0 - after) / (2.0 - before)
-        heaving = (1.0 - after) / (1.0 - before)
-        scale = np.sqrt([sliding, sliding, heaving, heaving, heaving, 1.0])
+        scale = static_scale(self.solved.soil.poisson_ratio, self.poisson_ratio)
         omega = np.maximum(omega, self.solved.omega_range[0])
         return np.asarray(self.solved.compliance(omega) * np.outer(scale, scale))
 
 
 def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
     """
-    Return a model of the same kind as a given one on another soil.
+    Return a model of the same kind as a given one, below the same contacts, on another soil.
 
     Raises
     ------
@@ -61,6 +59,8 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
 
     """
     match model:
+        case BoundaryElementModel():
+            return model.on(soil)
         case ConeModel():
             return ConeModel(soil, contact)
         case InfiniteElementModel(table=table):

@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import require
+from rotorsoil_ros.ground.plan import Part, Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +113,25 @@ class Circle:
         return self.radius
 
 
-Contact: TypeAlias = Rectangle | Circle
+Contact: TypeAlias = Rectangle | Circle | Plan
+
+
+def parts_of(contact: Rectangle | Plan) -> tuple[Part, ...]:
+    """Return the rectangles of a contact about its centre."""
+    if isinstance(contact, Plan):
+        return contact.centred
+    return (Part(contact.half_width, contact.half_length, 0.0, 0.0),)
+
+
+def extents(contact: Contact) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return first and last x, first and last y of a contact about its centre [m]."""
+    match contact:
+        case Plan():
+            return contact.extents
+        case Circle(radius=radius):
+            return (-radius, radius), (-radius, radius)
+    return ((-contact.half_width, contact.half_width),
+            (-contact.half_length, contact.half_length))
 
 
 def equivalent_radii(contact: Contact) -> FloatArray:
@@ -143,6 +162,19 @@ def equivalent_radii(contact: Contact) -> FloatArray:
         (4.0 * about_y / math.pi) ** 0.25,
         (2.0 * about_z / math.pi) ** 0.25,
     ])
+
+
+def static_scale(before: float, after: float) -> FloatArray:
+    """
+    Return by what another Poisson's ratio multiplies displacements, (6,), roughly.
+
+    The square roots of the ratios of the static compliances of a smooth disc, (2 - nu) for
+    sliding, (1 - nu) for heaving and rocking, 1 for torsion: on both sides of a compliance they
+    are exact at rest and keep it passive.
+    """
+    sliding = (2.0 - after) / (2.0 - before)
+    heaving = (1.0 - after) / (1.0 - before)
+    return np.sqrt([sliding, sliding, heaving, heaving, heaving, 1.0])
 
 
 class SoilModel(Protocol):

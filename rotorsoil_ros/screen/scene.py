@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import across, Channel, DOFS, JOURNAL
-from rotorsoil_ros.ground.soil import Rectangle
+from rotorsoil_ros.ground.soil import extents
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.disc import Disc
 
@@ -173,9 +173,7 @@ def round_scale(wanted: float) -> float:
 
 
 def _block(foundation: Foundation, case: Case, index: Mapping[str, int]) -> Block:
-    contact = foundation.contact
-    width, length = ((contact.half_width, contact.half_length) if isinstance(contact, Rectangle)
-                     else (contact.radius, contact.radius))
+    width, length = (0.5 * (last - first) for first, last in extents(foundation.contact))
     seats = tuple(bearing.position for bearing in case.rotor.bearings
                   if bearing.foundation == foundation.name)
     channels = tuple(index[Channel(foundation.name, '', dof)] for dof in DOFS)

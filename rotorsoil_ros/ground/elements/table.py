@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import OutOfTableError, require, RotorSoilError
 from rotorsoil_ros.ground.infinite_rational import RationalFunction
+from rotorsoil_ros.ground.joining import laplace_point
 
 GEOMETRIES = ('disc', 'plane_strain', 'plane_stress')
 PLANE_ENTRIES = ('xx', 'zz', 'ryry', 'xry')
@@ -186,20 +187,6 @@ class DimensionlessTable:
         if not all(np.isfinite(part).all() for part in (support, values, weights)):
             raise RotorSoilError('not a table of dimensionless compliances: not finite')
         return table
-
-
-def laplace_point(a0: FloatArray, loss_factor: float) -> ComplexArray:
-    """
-    Return the dimensionless Laplace variable, i a0 / sqrt(1 + i eta).
-
-    Notes
-    -----
-    Hysteretic damping multiplies every modulus by 1 + i eta. Divided by it, the equations of
-    motion are those of the undamped soil at this complex frequency.
-
-    """
-    points: ComplexArray = 1j * np.asarray(a0, dtype=float) / np.sqrt(1.0 + 1j * loss_factor)
-    return points
 
 
 def effective_poisson_ratio(geometry: str, poisson_ratio: float) -> float:

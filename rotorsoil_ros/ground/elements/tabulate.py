@@ -1,35 +1,22 @@
-"""Which frequencies to solve so that a rational function says the rest, and how well it does."""
+"""The compliance of a kind of soil by finite and infinite elements: exact, and as a table."""
 
-from collections.abc import Callable
 import math
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import NotSolvedError, require
+from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.elements.mesh import Discretisation, discretisation_for
 from rotorsoil_ros.ground.elements.solver import HalfSpaceSolver
 from rotorsoil_ros.ground.elements.table import (
     DimensionlessTable,
     effective_poisson_ratio,
     error_scale,
-    laplace_point,
     require_kind,
     require_range,
     SMALLEST_A0,
 )
-from rotorsoil_ros.ground.infinite_rational import fit_rational, RationalFunction
-
-FIRST_SOLVES = 9
-CHECKS = 3
-COMPARED = 400
-MOST_SOLVES = 90
-# Share of the solved frequencies at which the fit is exact; the rest choose its poles. A
-# poorer fit beside it shows where the two know least.
-SUPPORT_SHARE = 0.8
-POORER_SHARE = 0.65
-
-Progress = Callable[[int, float], None]
+from rotorsoil_ros.ground.joining import joined, laplace_point, Progress
 
 
 def exact_compliance(
@@ -108,85 +95,22 @@ def tabulate(
 
     Notes
     -----
-    Exact solves at Chebyshev points of sqrt(a0) are joined by a rational function. Then rounds:
-    in the gaps where it differs most from a poorer fit, the middle is solved and compared
-    before it joins the data. The first round within tolerance is the last.
-
-    A disc's compliance is smooth through a0 = 0 and known on both sides of it, because
-    f(conj s) = conj f(s); so a range from 0 is interpolated, not extrapolated. A strip has no
-    static limit.
+    Solves are joined as `joining.joined` says. A disc's compliance is smooth through a0 = 0 and
+    known on both sides of it, because f(conj s) = conj f(s); so a range from 0 is interpolated,
+    not extrapolated. A strip has no static limit.
 
     """
     require_kind(geometry, poisson_ratio, loss_factor)
     require_range(geometry, a0_min, a0_max)
     require(0.0 < tolerance < 1.0, 'tolerance', 'in (0, 1) [-]', tolerance)
-    lowest = max(a0_min, SMALLEST_A0)
     solver = HalfSpaceSolver(
         effective_poisson_ratio(geometry, poisson_ratio), discretisation_for(a0_min, a0_max),
         axisymmetric=geometry == 'disc')
-
-    def solve(wanted: FloatArray, before: int, error: float) -> ComplexArray:
-        solved = []
-        for point in laplace_point(wanted, loss_factor):
-            solved.append(solver.compliance(complex(-1j * point)))
-            if progress is not None:
-                progress(before + len(solved), error)
-        return np.array(solved)
-
-    error = math.inf
-    a0 = _chebyshev(lowest, a0_max, FIRST_SOLVES)
-    values = solve(a0, 0, error)
-    fit = _fit(a0, values, loss_factor, SUPPORT_SHARE)
-    everywhere = laplace_point(_chebyshev(lowest, a0_max, COMPARED), loss_factor)
-    while a0.size <= MOST_SOLVES:
-        middles = _least_known_middles(a0, values, loss_factor)
-        unseen = solve(middles, a0.size, error)
-        error = _difference(fit(laplace_point(middles, loss_factor)), unseen)
-        order = np.argsort(np.append(a0, middles))
-        a0 = np.append(a0, middles)[order]
-        values = np.concatenate([values, unseen])[order]
-        checked, fit = fit, _fit(a0, values, loss_factor, SUPPORT_SHARE)
-        # The better fit has met no unseen frequency: it must not stray from the one that has.
-        error = max(error, _difference(fit(everywhere), checked(everywhere)))
-        if error <= tolerance:
-            return DimensionlessTable(
-                geometry=geometry, poisson_ratio=poisson_ratio, loss_factor=loss_factor,
-                a0_min=a0_min, a0_max=a0_max, function=fit, measured_error=error,
-                solves=a0.size, unknowns=sum(solver.dofs))
-    raise NotSolvedError(
-        f'the compliance of {geometry}, poisson_ratio {poisson_ratio:g}, still has an error of '
-        f'{error:.1e} after {a0.size} solves, allowed is {tolerance:g}')
-
-
-def _difference(values: ComplexArray, reference: ComplexArray) -> float:
-    return float((np.abs(values - reference) / error_scale(reference)).max())
-
-
-def _chebyshev(lowest: float, highest: float, count: int) -> FloatArray:
-    """Return Chebyshev points of sqrt(a0), ends included: finer where a strip's log lives."""
-    position = (1.0 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2.0
-    ends = math.sqrt(lowest), math.sqrt(highest)
-    points: FloatArray = (ends[0] + (ends[1] - ends[0]) * position) ** 2
-    return points
-
-
-def _fit(
-    a0: FloatArray, values: ComplexArray, loss_factor: float, share: float,
-) -> RationalFunction:
-    return fit_rational(laplace_point(a0, loss_factor), values, scale=error_scale(values),
-                        size=int(share * a0.size))
-
-
-def _least_known_middles(
-    a0: FloatArray, values: ComplexArray, loss_factor: float,
-) -> FloatArray:
-    """Return middles of gaps, one in each part of the range: where two fits differ most there."""
-    root = np.sqrt(a0)
-    middles: FloatArray = ((root[1:] + root[:-1]) / 2.0) ** 2
-    points = laplace_point(middles, loss_factor)
-    good, poorer = (
-        _fit(a0, values, loss_factor, share)(points) for share in (SUPPORT_SHARE, POORER_SHARE))
-    difference = (np.abs(good - poorer) / error_scale(good)).max(axis=1)
-    # One in each part: a fit can be wrong where both fits agree, and then not everywhere.
-    parts = np.array_split(np.arange(middles.size), max(CHECKS, a0.size // 4))
-    return middles[[part[difference[part].argmax()] for part in parts]]
+    found = joined(
+        f'{geometry}, poisson_ratio {poisson_ratio:g},',
+        lambda point: solver.compliance(-1j * point), (max(a0_min, SMALLEST_A0), a0_max),
+        loss_factor=loss_factor, scale=error_scale, tolerance=tolerance, progress=progress)
+    return DimensionlessTable(
+        geometry=geometry, poisson_ratio=poisson_ratio, loss_factor=loss_factor,
+        a0_min=a0_min, a0_max=a0_max, function=found.function,
+        measured_error=found.measured_error, solves=found.solves, unknowns=sum(solver.dofs))

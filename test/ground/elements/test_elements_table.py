@@ -144,7 +144,7 @@ def test_what_cannot_be_tabulated_is_refused_in_one_line(change, message):
 
 
 def test_a_tolerance_that_is_not_met_is_an_error_and_not_a_table(monkeypatch):
-    monkeypatch.setattr('rotorsoil_ros.ground.elements.tabulate.MOST_SOLVES', 11)
+    monkeypatch.setattr('rotorsoil_ros.ground.joining.MOST_SOLVES', 11)
     with pytest.raises(NotSolvedError, match=r'after 12 solves, allowed is 1e-12'):
         tabulate('plane_strain', poisson_ratio=0.25, loss_factor=0.1, tolerance=1e-12)
 

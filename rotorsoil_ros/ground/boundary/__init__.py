@@ -1,0 +1,1 @@
+"""Contacts of any plan on a half-space, by boundary elements."""

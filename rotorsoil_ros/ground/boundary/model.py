@@ -1,0 +1,189 @@
+"""What blocks of any plan on a half-space give way by, from boundary elements."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.errors import OutOfTableError, require, RotorSoilError
+from rotorsoil_ros.ground.boundary.effort import highest_a0
+from rotorsoil_ros.ground.boundary.site import Site
+from rotorsoil_ros.ground.boundary.table import BoundaryTable
+from rotorsoil_ros.ground.soil import Contact, Soil, static_scale
+
+# A few units in the last place lost on the way from rad/s to a0 are not another frequency.
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class BoundaryElementModel:
+    """
+    Rigid massless contacts welded to one half-space, coupled through it.
+
+    Attributes
+    ----------
+    soil : Soil
+        Half-space.
+    site : Site
+        Blocks, and points on the ground whose motion is asked for.
+    tables : tuple of BoundaryTable
+        Solved for this site over its length, by rising Poisson's ratio.
+
+    Notes
+    -----
+    G, rho and size are a rescaling, and eta another point of the same analytic functions. Between
+    the Poisson's ratios of two tables the compliance is interpolated linearly, which keeps it
+    passive; beyond them it is scaled by the static compliances of a disc (`static_scale`).
+
+    Where radiation is weaker than the error of the tables, -Im N is lifted to be positive
+    semidefinite: by less than 1e-4 of a motion's own size, as rows of a table are joined.
+
+    """
+
+    soil: Soil
+    site: Site
+    tables: tuple[BoundaryTable, ...]
+
+    def __post_init__(self) -> None:
+        require(len(self.tables) > 0, 'tables', 'at least one', 0)
+        for table in self.tables:
+            if table.site != self.site.scaled():
+                raise RotorSoilError('table must be that of the site')
+
+    @classmethod
+    def solved(
+        cls, soil: Soil, contact: Contact, *, omega_max: float,
+    ) -> 'BoundaryElementModel':
+        """Return the model of one contact, solved now for frequencies up to one [rad/s]."""
+        return cls.solved_together(soil, Site.of((contact,), ((0.0, 0.0),)),
+                                   omega_max=omega_max)
+
+    @classmethod
+    def solved_together(
+        cls, soil: Soil, site: Site, *, omega_max: float,
+    ) -> 'BoundaryElementModel':
+        """
+        Return the model of several contacts, solved now for frequencies up to one [rad/s].
+
+        Raises
+        ------
+        RotorSoilError
+            If soil or frequency are out of reach.
+        NotSolvedError
+            If the frequencies do not join.
+
+        """
+        # Here and not above: Hankel functions and splines take 0.1 s to import, and a stored
+        # table needs none.
+        from rotorsoil_ros.ground.boundary.tabulate import tabulated
+
+        scaled = site.scaled()
+        a0_max = highest_a0(scaled, omega_max * site.length / soil.shear_wave_speed)
+        return cls(soil, site, (tabulated(
+            scaled, poisson_ratio=soil.poisson_ratio, loss_factor=soil.loss_factor,
+            a0_max=a0_max),))
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks that stand on this ground, k."""
+        return len(self.site.blocks)
+
+    @property
+    def omega_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency that the tables cover [rad/s]."""
+        highest = min(table.a0_max for table in self.tables)
+        return 0.0, highest * self.soil.shear_wave_speed / self.site.length
+
+    def on(self, soil: Soil) -> 'BoundaryElementModel':
+        """Return the same blocks on another soil, from the same tables."""
+        return replace(self, soil=soil)
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """
+        Return the compliance of the massless contacts.
+
+        Parameters
+        ----------
+        omega : (n,) float array
+            Excitation frequencies [rad/s].
+
+        Returns
+        -------
+        (n, 6 k, 6 k) complex array
+            Over (x, y, z, rx, ry, rz) of each block about its centre [m/N], [1/N], [rad/(N m)].
+
+        Raises
+        ------
+        OutOfTableError
+            If a frequency lies outside `omega_range`.
+
+        """
+        size = 6 * self.blocks
+        values = self._values(omega)[..., :size, :]
+        return kept_passive(values.reshape(-1, size, size)).reshape(values.shape)
+
+    def point_motion(self, omega: FloatArray) -> ComplexArray:
+        """
+        Return the motion of the points on the ground, (n, 3 p, 6 k) over (x, y, z) of each.
+
+        Per force and moment of each block on the ground [m/N], [1/N]; parameters and errors as
+        in `compliance`.
+        """
+        return self._values(omega)[..., 6 * self.blocks:, :]
+
+    def _values(self, omega: FloatArray) -> ComplexArray:
+        omega = np.asarray(omega, dtype=float)
+        highest = self.omega_range[1]
+        inside = (omega >= 0.0) & (omega <= highest * (1.0 + _ROUNDING))
+        if not inside.all():
+            raise OutOfTableError(
+                f'frequency must be in [0, {highest:g}] rad/s, where the boundary elements were '
+                f'solved, got {omega[~inside][0]:g}')
+        a0 = omega.ravel() * (self.site.length / self.soil.shear_wave_speed)
+        return self._dimensioned(self._mixed(a0)).reshape(
+            *omega.shape, -1, 6 * self.blocks)
+
+    def _mixed(self, a0: FloatArray) -> ComplexArray:
+        """Return what the tables say for the Poisson's ratio of the soil, without dimension."""
+        ratio, loss = self.soil.poisson_ratio, self.soil.loss_factor
+        known = [table.poisson_ratio for table in self.tables]
+        above = int(np.searchsorted(known, ratio))
+        if above < len(known) and known[above] == ratio:
+            return self.tables[above].values(a0, loss)
+        if 0 < above < len(known):
+            lower, upper = known[above - 1:above + 1]
+            share = (ratio - lower) / (upper - lower)
+            return ((1.0 - share) * self.tables[above - 1].values(a0, loss)
+                    + share * self.tables[above].values(a0, loss))
+        nearest = min(above, len(known) - 1)
+        scale = np.tile(static_scale(known[nearest], ratio), self.blocks)
+        points = np.tile(static_scale(known[nearest], ratio)[:3], len(self.site.points))
+        return self.tables[nearest].values(a0, loss) * np.outer(
+            np.concatenate([scale, points]), scale)
+
+    def _dimensioned(self, values: ComplexArray) -> ComplexArray:
+        """Give dimensionless values, (n, 6 k + 3 p, 6 k), their units."""
+        length = self.site.length
+        # A rotation is over a length, and a moment is a force at it.
+        own = np.tile([1.0] * 3 + [1.0 / length] * 3, self.blocks)
+        rows = np.concatenate([own, np.ones(3 * len(self.site.points))])
+        return np.asarray(values * np.outer(rows, own) / (self.soil.shear_modulus * length))
+
+
+def kept_passive(compliance: ComplexArray) -> ComplexArray:
+    """Return compliances (n, d, d) whose losses -Im N are lifted to be no gain."""
+    size = np.sqrt(np.abs(np.diagonal(compliance, axis1=1, axis2=2)))
+    unit = size[:, :, None] * size[:, None]
+    loss = -compliance.imag / unit
+    try:
+        np.linalg.cholesky(loss)
+    except np.linalg.LinAlgError:
+        # Some row gives energy, by as much as round-off or the fit of the tables.
+        values, vectors = np.linalg.eigh(loss)
+        gains = values[:, 0] < 0.0
+        lifted = (vectors[gains] * np.maximum(values[gains], 0.0)[:, None]) @ (
+            vectors[gains].swapaxes(1, 2))
+        lifted = 0.5 * (lifted + lifted.swapaxes(1, 2))  # reciprocal to the last bit
+        compliance = compliance.copy()
+        compliance[gains] = compliance[gains].real - 1j * lifted * unit[gains]
+    return compliance

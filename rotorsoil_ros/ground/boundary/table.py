@@ -1,0 +1,115 @@
+"""What boundary elements know of a site: compliance without G, rho and size."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.boundary.site import Site
+from rotorsoil_ros.ground.infinite_rational import RationalFunction
+from rotorsoil_ros.ground.joining import laplace_point
+
+# Part of every cache key: raise it when the method changes what a table says.
+BOUNDARY_ALGORITHM = 1
+
+# Rayleigh waves run at 0.87 to 0.96 of c_s: what they need from block to block is taken out of
+# what is interpolated.
+_SLOWNESS = 1.08
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoundaryTable:
+    """
+    Compliance of a site of unit length on a half-space with G = rho = 1.
+
+    Attributes
+    ----------
+    site : Site
+        `scaled`.
+    poisson_ratio, loss_factor : float
+        nu and eta of the soil [-].
+    a0_max : float
+        Highest a0 that was solved [-]; the lowest is 0.
+    function : RationalFunction
+        Of the Laplace variable: elastic compliances and motions, each ahead by its delay.
+    entries : (q, 2) int array
+        Row and column of each: first those of the upper triangle of the compliance over the six
+        degrees of freedom of each block, then below it those of x, y, z of each point.
+    measured_error : float
+        Largest error at frequencies that a fit had not seen, of sqrt(N_ii N_jj).
+    solves, unknowns : int
+        Number of exact solves, and unknowns of each.
+
+    """
+
+    site: Site
+    poisson_ratio: float
+    loss_factor: float
+    a0_max: float
+    function: RationalFunction
+    entries: IntArray
+    measured_error: float
+    solves: int
+    unknowns: int
+
+    def values(self, a0: FloatArray, loss_factor: float) -> ComplexArray:
+        """Return compliance above motion of the points, (n, 6 k + 3 p, 6 k), on such a soil."""
+        point = laplace_point(a0, loss_factor)
+        size = 6 * len(self.site.blocks)
+        rows, columns = self.entries.T
+        ahead = delays(self.site)[rows, columns]
+        flat = self.function(point) * np.exp(-np.outer(point, ahead)) / (1.0 + 1j * loss_factor)
+        found = np.zeros((len(a0), size + 3 * len(self.site.points), size), dtype=complex)
+        found[:, rows, columns] = flat
+        inside = rows < size
+        found[:, columns[inside], rows[inside]] = flat[:, inside]
+        return found
+
+    def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the table as plain arrays; its site is part of the key it is found by."""
+        return {
+            'kind': np.array([self.poisson_ratio, self.loss_factor, self.a0_max,
+                              self.measured_error, self.solves, self.unknowns]),
+            'support': self.function.support, 'values': self.function.values,
+            'weights': self.function.weights, 'entries': self.entries}
+
+    @classmethod
+    def from_arrays(
+        cls, site: Site, arrays: Mapping[str, npt.NDArray[Any]],
+    ) -> 'BoundaryTable':
+        """
+        Return the table that `to_arrays` took apart.
+
+        Raises
+        ------
+        RotorSoilError
+            If an array is missing, of a wrong shape or not finite.
+
+        """
+        try:
+            kind = np.asarray(arrays['kind'], dtype=float)
+            poisson_ratio, loss_factor, a0_max, measured, solves, unknowns = kind.tolist()
+            function = RationalFunction(*(np.asarray(arrays[name], dtype=complex)
+                                          for name in ('support', 'values', 'weights')))
+            entries = np.asarray(arrays['entries'], dtype=int)
+        except (KeyError, TypeError, ValueError) as error:
+            raise RotorSoilError(f'not a table of boundary elements: {error}') from error
+        parts = function.support, function.values, function.weights, kind
+        size = 6 * len(site.blocks)
+        if not (entries.shape[1:] == (2,) and function.values.shape == (
+                function.support.size, len(entries)) and all(
+                np.isfinite(part).all() for part in parts) and entries[:, 1].max() < size):
+            raise RotorSoilError('not a table of boundary elements: wrong shapes or not finite')
+        return cls(site, poisson_ratio, loss_factor, a0_max, function, entries, measured,
+                   int(solves), int(unknowns))
+
+
+def delays(site: Site) -> FloatArray:
+    """Return how long waves need for compliance and motion, over c_s, (6 k + 3 p, 6 k)."""
+    between, to_points = site.delays()
+    apart = np.concatenate([between.repeat(6, axis=0), to_points.repeat(3, axis=0)])
+    return _SLOWNESS * apart.repeat(6, axis=1)
