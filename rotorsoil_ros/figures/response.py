@@ -90,7 +90,7 @@ def support(case: Case, model: CoupledModel) -> Figure:
     omega = np.linspace(*case.speed_range, 400)
     figure = Figure(figsize=(7.5, 7.5), layout='constrained')
     grid = figure.subplots(3, 2, sharex=True)
-    for block, soil in zip(model.foundations, model.soil_models, strict=True):
+    for block, soil in zip(model.foundations, model.support.soils, strict=True):
         diagonal = np.diagonal(soil.compliance(omega), axis1=1, axis2=2)
         for dof in np.flatnonzero(np.all(diagonal != 0.0, axis=0)):
             column = grid[:, dof // 3]

@@ -1,13 +1,14 @@
 """What the ground is, where it is touched, and what every model of it must answer."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Protocol, TypeAlias
+from typing import Protocol, runtime_checkable, TypeAlias
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import require
+from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.ground.plan import Part, Plan
 
 
@@ -178,11 +179,60 @@ def static_scale(before: float, after: float) -> FloatArray:
 
 
 class SoilModel(Protocol):
-    """What everything above the soil knows of it."""
+    """What everything above the soil knows of it: one below each block, or one below all."""
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
         ...
+
+
+@runtime_checkable
+class SharedGround(Protocol):
+    """Ground below several blocks that move each other through it."""
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks, k."""
+        ...
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of all massless contacts, (n, 6 k, 6 k)."""
+        ...
+
+    def point_motion(self, omega: FloatArray) -> ComplexArray:
+        """Return the motion of points on it per load on the blocks, (n, 3 p, 6 k)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class OneOfBlocks:
+    """What one of several blocks stands on, the others lying on the ground without loads."""
+
+    ground: SharedGround
+    index: int
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
+        own = slice(6 * self.index, 6 * self.index + 6)
+        return self.ground.compliance(omega)[..., own, own]
+
+
+def below_each(models: Sequence[SoilModel], blocks: int) -> tuple[SoilModel, ...]:
+    """
+    Return what each of several blocks stands on.
+
+    Raises
+    ------
+    RotorSoilError
+        If there is neither one model for each nor one that knows of all of them.
+
+    """
+    if len(models) == 1 and isinstance(models[0], SharedGround) and models[0].blocks == blocks:
+        return tuple(OneOfBlocks(models[0], index) for index in range(blocks))
+    if len(models) != blocks:
+        raise RotorSoilError(f'{blocks} foundations need as many soil models, or one ground below '
+                             f'all of them, got {len(models)}')
+    return tuple(models)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.accuracy import StifferGround
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
@@ -230,14 +231,16 @@ def _response(predictor: Predictor, speed: FloatArray) -> ComplexArray:
 
 def depends_on_soil(model: CoupledModel) -> bool:
     """Return whether a machine stands on a soil that its model knows."""
-    return any(isinstance(soil, (ConeModel, InfiniteElementModel)) for soil in model.soil_models)
+    return any(isinstance(soil, (BoundaryElementModel, ConeModel, InfiniteElementModel))
+               for soil in model.soil_models)
 
 
 def on_soils(model: CoupledModel, soils: Sequence[Soil]) -> list[CoupledModel]:
     """Return a machine on each of several soils, the same below all of its blocks."""
     return [replace(model, soil_models=tuple(
         on_soil(own, soil, block.contact)
-        for own, block in zip(model.soil_models, model.foundations, strict=True)))
+        # One ground below all blocks needs none of their contacts.
+        for own, block in zip(model.soil_models, model.foundations, strict=False)))
         for soil in soils]
 
 

@@ -49,6 +49,8 @@ class CoupledModel:
         Blocks and the soil under each; bearings without a block stand on firm ground.
     couples : sequence of str
         Discs whose unbalance is also a couple: each is a plane of its own.
+    points : sequence of str
+        Names of the points on the ground whose motion its `SharedGround` tells, in its order.
 
     """
 
@@ -56,6 +58,7 @@ class CoupledModel:
     foundations: Sequence[Foundation] = ()
     soil_models: Sequence[SoilModel] = ()
     couples: Sequence[str] = ()
+    points: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         discs = [disc.name for disc in self.rotor.discs]
@@ -65,7 +68,11 @@ class CoupledModel:
         repeated = {name for name in self.channels if self.channels.count(name) > 1}
         if repeated:
             raise RotorSoilError(f'names must differ between stations, got {min(repeated)} twice')
-        _ = self.support
+        support = self.support
+        known = support.points(np.zeros(1)).shape[1] if self.points else 0
+        if known != self._on_ground:
+            raise RotorSoilError(f'{len(self.points)} points on the ground need a ground that '
+                                 f'tells their motion, got one of {known // 3} points')
 
     @cached_property
     def support(self) -> Support:
@@ -83,6 +90,7 @@ class CoupledModel:
                   for channel in across(station.name)]
         found += [Channel(foundation.name, '', dof)
                   for foundation in self.foundations for dof in DOFS]
+        found += [Channel(point, '', axis) for point in self.points for axis in DOFS[:3]]
         return tuple(found)
 
     @cached_property
@@ -90,7 +98,12 @@ class CoupledModel:
         """Which channels transmit a force, (c,) bool: bearings and foundations."""
         stations = 2 * len(self.rotor.discs) + 2 * len(self.rotor.probes)
         return np.array([True] * (4 * len(self.rotor.bearings)) + [False] * stations
-                        + [True] * (6 * len(self.foundations)))
+                        + [True] * (6 * len(self.foundations)) + [False] * self._on_ground)
+
+    @property
+    def _on_ground(self) -> int:
+        """Number of channels on the ground, the last of all."""
+        return 3 * len(self.points)
 
     @cached_property
     def groups(self) -> IntArray:
@@ -218,9 +231,9 @@ class CoupledModel:
     def _forced(
         self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, channel: str,
     ) -> Response:
-        if channel not in self.channels:
-            raise RotorSoilError(f'force must act at one of {", ".join(self.channels)}, '
-                                 f'got {channel}')
+        loaded = self.channels[:len(self.channels) - self._on_ground]
+        if channel not in loaded:
+            raise RotorSoilError(f'force must act at one of {", ".join(loaded)}, got {channel}')
         load = np.zeros((len(self.channels), 1), dtype=complex)
         load[self.channels.index(channel)] = 1.0
         displacement, force = self._respond(modes, omega, speed, self._sorted(load))
@@ -228,6 +241,7 @@ class CoupledModel:
 
     def _sorted(self, loads: ComplexArray) -> ComplexArray:
         """Put loads on the channels, (c, k), into the order of ports, housings and blocks."""
+        loads = loads[:len(loads) - self._on_ground]
         bearings = 4 * len(self.rotor.bearings)
         blocks = len(loads) - 6 * len(self.foundations)
         seats = loads[:bearings].reshape(-1, 2, 2, loads.shape[1])
@@ -294,7 +308,7 @@ class CoupledModel:
 
         displacement = np.concatenate([
             interleave(found.ports[:, :2 * bearings], found.housings),
-            found.ports[:, 2 * bearings:2 * stations], found.blocks], axis=1)
+            found.ports[:, 2 * bearings:2 * stations], found.blocks, found.ground], axis=1)
         return displacement, np.concatenate([
             interleave(found.through, found.through), found.into_soil], axis=1)
 

@@ -27,6 +27,8 @@ class Answer:
         Force through the bearings [N].
     into_soil : (n, 6 f, k) complex array
         Force of the blocks on the soil [N, N m].
+    ground : (n, 3 p, k) complex array
+        Motion of points on the ground [m].
 
     """
 
@@ -35,6 +37,7 @@ class Answer:
     blocks: ComplexArray
     through: ComplexArray
     into_soil: ComplexArray
+    ground: ComplexArray
 
 
 def answer(
@@ -95,4 +98,5 @@ def answer(
     through = beyond + springs[:, None] * ports[:, journals]
     motion = housings @ through + moved
     blocks, into_soil = standing.blocks(through, motion, below, pushed)
-    return Answer(ports, motion, blocks, through, into_soil)
+    ground = standing.support.points(standing.omega) @ into_soil
+    return Answer(ports, motion, blocks, through, into_soil, ground)

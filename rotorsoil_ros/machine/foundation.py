@@ -5,6 +5,7 @@ from functools import lru_cache
 import math
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, require
@@ -41,6 +42,10 @@ class Foundation:
         Moments of inertia about the centre of gravity, axes x, y, z [kg m^2].
     height : float or None
         Of the block above the contact plane [m]; nothing but pictures depends on it.
+    centre_x : float
+        Position of the contact centre across the shaft, whose plane is x = 0 [m].
+    inertia_product : float
+        Integral of x y dm about the centre of gravity [kg m^2]: of an L, not of a rectangle.
 
     """
 
@@ -51,10 +56,13 @@ class Foundation:
     centre_of_gravity_height: float
     inertia: tuple[float, float, float]
     height: float | None = None
+    centre_x: float = 0.0
+    inertia_product: float = 0.0
 
     def __post_init__(self) -> None:
         require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)
         require(math.isfinite(self.centre_y), 'centre_y', 'finite, in m', self.centre_y)
+        require(math.isfinite(self.centre_x), 'centre_x', 'finite, in m', self.centre_x)
         require(math.isfinite(self.centre_of_gravity_height), 'centre_of_gravity_height',
                 'finite, in m', self.centre_of_gravity_height)
         if self.height is not None:
@@ -89,6 +97,7 @@ class Foundation:
         # The top of a block that turns by +ry moves toward +x, by +rx toward -y.
         matrix[0, 4] = matrix[4, 0] = m * height
         matrix[1, 3] = matrix[3, 1] = -m * height
+        matrix[3, 4] = matrix[4, 3] = -self.inertia_product
         return matrix
 
     def seat_rows(self, *, position: float, height: float) -> FloatArray:
@@ -101,7 +110,7 @@ class Foundation:
         along = position - self.centre_y
         return np.array([
             [1.0, 0.0, 0.0, 0.0, height, -along],
-            [0.0, 0.0, 1.0, along, 0.0, 0.0],
+            [0.0, 0.0, 1.0, along, self.centre_x, 0.0],
         ])
 
 
@@ -171,11 +180,10 @@ class BlockReceptance:
 def _coupled(flags: bytes, size: int) -> tuple[IntArray, ...]:
     """Return sets of coupled degrees of freedom, one array (g, s) for each size of a set."""
     pattern = np.frombuffer(flags, dtype=bool).reshape(size, size)
-    joined = (pattern | pattern.T).astype(int)
-    chains = np.linalg.matrix_power(joined + np.eye(size, dtype=int), size) > 0
+    _, labels = connected_components(pattern, directed=False)
     members: dict[int, list[int]] = {}
-    for dof in np.flatnonzero(joined.any(axis=0)).tolist():
-        members.setdefault(int(chains[dof].argmax()), []).append(dof)
+    for dof in np.flatnonzero((pattern | pattern.T).any(axis=0)).tolist():
+        members.setdefault(int(labels[dof]), []).append(dof)
     sizes: dict[int, list[list[int]]] = {}
     for found in members.values():
         sizes.setdefault(len(found), []).append(found)

@@ -11,7 +11,7 @@ import scipy.linalg
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
 from rotorsoil_ros.ground.rational import Continuation
-from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.ground.soil import below_each, SharedGround, SoilModel
 from rotorsoil_ros.machine.foundation import BlockReceptance, carrying, Foundation
 from rotorsoil_ros.rotor.bearing import Bearing
 
@@ -36,8 +36,10 @@ class Support:
         What stands on the blocks.
     shaft_height : float
         Of the bearings above the contact plane [m].
-    foundations, soil_models : equally long sequences
-        The blocks and the soil under each.
+    foundations : sequence of Foundation
+        The blocks.
+    soil_models : sequence of SoilModel
+        The soil under each, or one `SharedGround` under all of them.
 
     """
 
@@ -47,14 +49,46 @@ class Support:
     soil_models: Sequence[SoilModel]
 
     def __post_init__(self) -> None:
-        if len(self.foundations) != len(self.soil_models):
-            raise RotorSoilError(f'{len(self.foundations)} foundations need as many soil models, '
-                                 f'got {len(self.soil_models)}')
+        _ = self.soils
         names = {foundation.name for foundation in self.foundations}
         for bearing in self.bearings:
             if bearing.foundation is not None and bearing.foundation not in names:
                 raise RotorSoilError(f'foundation of {bearing.name} must be one of '
                                      f'{sorted(names)}, got {bearing.foundation}')
+
+    @cached_property
+    def soils(self) -> tuple[SoilModel, ...]:
+        """What each block stands on, as if the others were not loaded."""
+        return below_each(self.soil_models, len(self.foundations))
+
+    @property
+    def _shared(self) -> SharedGround | None:
+        """The ground below all blocks, if it is one."""
+        first = self.soil_models[0] if len(self.soil_models) == 1 else None
+        return first if isinstance(first, SharedGround) else None
+
+    def ground(self, omega: FloatArray) -> ComplexArray:
+        """Return the compliance of the ground under all blocks, (n, 6 f, 6 f)."""
+        if self._shared is not None:
+            return self._shared.compliance(omega)
+        size = 6 * len(self.soil_models)
+        total = np.zeros((len(omega), size, size), dtype=complex)
+        for index, model in enumerate(self.soil_models):
+            own = slice(6 * index, 6 * index + 6)
+            total[:, own, own] = model.compliance(omega)
+        return total
+
+    def points(self, omega: FloatArray) -> ComplexArray:
+        """Return the motion of points on the ground per load of the blocks, (n, 3 p, 6 f)."""
+        if self._shared is not None:
+            return self._shared.point_motion(omega)
+        return np.zeros((len(omega), 0, 6 * len(self.foundations)), dtype=complex)
+
+    @cached_property
+    def block_mass(self) -> FloatArray:
+        """Mass matrix of all blocks, (6 f, 6 f)."""
+        return np.asarray(scipy.linalg.block_diag(
+            np.zeros((0, 0)), *(block.mass_matrix for block in self.foundations)))
 
     @cached_property
     def seat_rows(self) -> FloatArray:
@@ -76,10 +110,15 @@ class Support:
         return rows
 
     @cached_property
+    def block_rows(self) -> FloatArray:
+        """Seat motion per unit motion of all blocks, (2 b, 6 f)."""
+        return self.seat_rows.transpose(1, 0, 2).reshape(2 * len(self.bearings), -1)
+
+    @cached_property
     def _seat_pairs(self) -> FloatArray:
-        """Products of the motion of two seats per unit motion of the blocks, (f, 6, 6, 4 b^2)."""
-        pairs = np.einsum('fpi,fqj->fijpq', self.seat_rows, self.seat_rows)
-        return np.asarray(pairs.reshape(*pairs.shape[:3], math.prod(pairs.shape[3:])))
+        """Products of the motion of two seats per unit motion of the blocks, (6 f, 6 f, 4 b^2)."""
+        pairs = np.einsum('pi,qj->ijpq', self.block_rows, self.block_rows)
+        return np.asarray(pairs.reshape(*pairs.shape[:2], math.prod(pairs.shape[2:])))
 
     @cached_property
     def pedestal_axes(self) -> list[int]:
@@ -106,11 +145,9 @@ class Support:
 
     def standing(self, omega: FloatArray) -> 'Standing':
         """Return how the support answers forces at frequencies (n,) [rad/s]."""
-        blocks = [BlockReceptance.of(model.compliance(omega), foundation.mass_matrix, omega)
-                  for model, foundation in zip(self.soil_models, self.foundations, strict=True)]
+        blocks = BlockReceptance.of(self.ground(omega), self.block_mass, omega)
         deflection = self.pedestals(omega)
-        for pairs, block in zip(self._seat_pairs, blocks, strict=True):
-            deflection += block.between(pairs).reshape(-1, *deflection.shape[1:])
+        deflection += blocks.between(self._seat_pairs).reshape(-1, *deflection.shape[1:])
         return Standing(self, omega, blocks, deflection)
 
     @cached_property
@@ -120,7 +157,7 @@ class Support:
 
         The motion of the support is that of its blocks, then the deflection of its pedestals.
         """
-        seats = self.seat_rows.transpose(1, 0, 2).reshape(2 * len(self.bearings), -1)
+        seats = self.block_rows
         return np.concatenate([seats, np.eye(len(seats))[:, self.pedestal_axes]], axis=1)
 
     @cached_property
@@ -128,18 +165,15 @@ class Support:
         """Mass matrix of the motion of the support, (s, s)."""
         rows = self.motion_rows
         total = np.asarray(rows.T @ self.housing_mass @ rows)
-        for index, foundation in enumerate(self.foundations):
-            block = slice(6 * index, 6 * index + 6)
-            total[block, block] += foundation.mass_matrix
+        blocks = len(self.block_mass)
+        total[:blocks, :blocks] += self.block_mass
         return total
 
     def motion_compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of soils and pedestals without any mass, (n, s, s)."""
         size, blocks = len(self.motion_mass), 6 * len(self.foundations)
         total = np.zeros((len(omega), size, size), dtype=complex)
-        for index, model in enumerate(self.soil_models):
-            block = slice(6 * index, 6 * index + 6)
-            total[:, block, block] = model.compliance(omega)
+        total[:, :blocks, :blocks] = self.ground(omega)
         axes = np.array(self.pedestal_axes, dtype=int)
         total[:, blocks:, blocks:] = self.pedestals(omega)[:, axes[:, None], axes]
         return total
@@ -233,8 +267,8 @@ class Standing:
         What it is.
     omega : (n,) float array
         Excitation frequency [rad/s].
-    block_receptances : list of BlockReceptance
-        Of each block on its soil.
+    block_receptance : BlockReceptance
+        Of all blocks on the ground.
     deflection : (n, 2 b, 2 b) complex array
         Motion of the housings per force into their pedestals [m/N].
 
@@ -242,7 +276,7 @@ class Standing:
 
     support: Support
     omega: FloatArray
-    block_receptances: list[BlockReceptance]
+    block_receptance: BlockReceptance
     deflection: ComplexArray
 
     @cached_property
@@ -280,14 +314,9 @@ class Standing:
         if not loads.any():  # the usual case, at no cost
             return (np.zeros((1, count, loads.shape[1]), dtype=complex),
                     np.zeros((1, len(loads) - count, loads.shape[1]), dtype=complex))
-        on_housings, on_blocks = loads[:count], loads[count:].reshape(-1, 1, 6, loads.shape[1])
-        blocks = [block.motion(load) for block, load
-                  in zip(self.block_receptances, on_blocks, strict=True)]
-        seats = np.zeros((len(self.omega), count, loads.shape[1]), dtype=complex)
-        for rows, motion in zip(self.support.seat_rows, blocks, strict=True):
-            seats += rows @ motion
-        return (self._carried(seats + self.deflection @ on_housings),
-                np.concatenate([seats[:, :0], *blocks], axis=1))
+        blocks = self.block_receptance.motion(loads[None, count:])
+        seats = self.support.block_rows @ blocks
+        return self._carried(seats + self.deflection @ loads[:count]), blocks
 
     def blocks(
         self, through: ComplexArray, housings: ComplexArray, loads: ComplexArray,
@@ -312,14 +341,6 @@ class Standing:
         seats = through + loads[:count]
         if self.support.housing_mass.any():
             seats = seats + square * (self.support.housing_mass @ housings)
-        motions, forces = [through[:, :0]], [through[:, :0]]
-        for index, (rows, block, foundation) in enumerate(zip(
-                self.support.seat_rows, self.block_receptances, self.support.foundations,
-                strict=True)):
-            own = slice(6 * index, 6 * index + 6)
-            at_seats = rows.T @ seats
-            motion = pushed[:, own] + block.motion(at_seats)
-            motions.append(motion)
-            forces.append(at_seats + loads[count:][own]
-                          + square * (foundation.mass_matrix @ motion))
-        return np.concatenate(motions, axis=1), np.concatenate(forces, axis=1)
+        at_seats = self.support.block_rows.T @ seats
+        motion = pushed + self.block_receptance.motion(at_seats)
+        return motion, at_seats + loads[count:] + square * (self.support.block_mass @ motion)

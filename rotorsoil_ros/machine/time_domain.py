@@ -130,14 +130,11 @@ class _System:
         self._gyroscopic[plane[1], plane[0]] = turning
         self._gyroscopic[plane[0], plane[1]] = -turning
         blocks = 2 * count
-        for index, foundation in enumerate(model.foundations):
-            own = slice(blocks + 6 * index, blocks + 6 * index + 6)
-            self.mass[own, own] = foundation.mass_matrix
+        self.mass[blocks:, blocks:] = model.support.block_mass
         self.discs = _rows(rotor, shapes, [disc.position for disc in rotor.discs], size).T
         journals = _rows(rotor, shapes, [bearing.position for bearing in rotor.bearings], size)
         self.housings = np.zeros((2 * len(rotor.bearings), size))
-        for index, rows in enumerate(model.support.seat_rows):
-            self.housings[:, blocks + 6 * index:blocks + 6 * index + 6] = rows
+        self.housings[:, blocks:] = model.support.block_rows
         # `_rows` has all x first, bearings have x and z in turn.
         order = np.arange(2 * len(rotor.bearings)).reshape(2, -1).T.ravel()
         self._stretch = journals[order] - self.housings
@@ -155,12 +152,7 @@ class _System:
 
     def _soils(self, speed: FloatArray) -> ComplexArray:
         """Return the compliance under all blocks, (n, 6 f, 6 f)."""
-        size = 6 * len(self._model.soil_models)
-        total = np.zeros((len(speed), size, size), dtype=complex)
-        for index, soil in enumerate(self._model.soil_models):
-            own = slice(6 * index, 6 * index + 6)
-            total[:, own, own] = soil.compliance(speed)
-        return total
+        return self._model.support.ground(speed)
 
     def matrices(self, speed: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
         """

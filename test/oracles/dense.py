@@ -203,13 +203,17 @@ class _System:
             matrix[:, row] += into_seats[:, pair] - through[:, pair]
             matrix[:, row, row] -= square * pedestal.mass
         compliances = np.zeros((len(omega), blocks, blocks), dtype=complex)
-        for index, (foundation, soil) in enumerate(
-                zip(model.foundations, model.soil_models, strict=True)):
+        for index, soil in enumerate(model.soil_models):
+            # A ground below all blocks fills the whole matrix.
+            part = slice(6 * index, 6 * index + 6) if len(model.soil_models) > 1 else slice(blocks)
+            compliances[:, part, part] = soil.compliance(omega)
+        rows = slice(size, size + blocks)
+        mass = np.zeros((blocks, blocks))
+        for index, foundation in enumerate(model.foundations):
             part = slice(6 * index, 6 * index + 6)
-            rows = slice(size + part.start, size + part.stop)
-            compliance = compliances[:, part, part] = soil.compliance(omega)
-            matrix[:, rows, rows] += np.eye(6) - square * (compliance @ foundation.mass_matrix)
-            matrix[:, rows] -= compliance @ seats[:, rows].T @ into_seats
+            mass[part, part] = foundation.mass_matrix
+        matrix[:, rows, rows] += np.eye(blocks) - square * (compliances @ mass)
+        matrix[:, rows] -= compliances @ seats[:, rows].T @ into_seats
         return cls(model, omega, matrix, through, into_seats, housings, compliances)
 
     @property

@@ -106,7 +106,7 @@ class ModeNames:
         """Return the energy that the soil stores by each motion of each block."""
         found = {}
         for index, (block, soil) in enumerate(zip(
-                self.model.foundations, self.model.soil_models, strict=True)):
+                self.model.foundations, self.model.support.soils, strict=True)):
             own = np.abs(support[6 * index:6 * index + 6]) ** 2
             gives = np.abs(np.diagonal(soil.compliance(np.array([frequency]))[0]))
             for dof, square, compliance in zip(DOFS, own.tolist(), gives.tolist(), strict=True):

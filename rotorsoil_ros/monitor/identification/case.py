@@ -326,7 +326,7 @@ def _rebuilt(case: Case, nominal: CoupledModel) -> CoupledModel:
     soils = nominal.soil_models
     if case.soil is not None and depends_on_soil(nominal):
         soils = tuple(on_soil(own, case.soil, block.contact)
-                      for own, block in zip(soils, case.foundations, strict=True))
+                      for own, block in zip(soils, case.foundations, strict=False))
     return replace(nominal, rotor=case.rotor, foundations=case.foundations, soil_models=soils)
 
 
