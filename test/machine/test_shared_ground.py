@@ -134,7 +134,7 @@ def test_another_soil_goes_below_all_blocks(model):
 
 
 def test_a_force_on_the_ground_is_refused(model):
-    with pytest.raises(RotorSoilError, match='force must act at one of .*right_rz, got yard_z'):
+    with pytest.raises(RotorSoilError, match=r'force must act at one of .*right_rz, got yard_z'):
         model.frequency_response(np.array([10.0]), speed=0.0, channel='yard_z')
 
 
