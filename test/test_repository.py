@@ -13,8 +13,9 @@ CODE = sorted(path for folder in ('rotorsoil_ros', 'test', 'benchmarks', 'docs',
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*.rst'), *(ROOT / 'docs').rglob('*.md'),
                 *(ROOT / 'test').rglob('*.md')])
 REFERENCE = ROOT / 'test' / 'reference'
-# What a machine may lack: optional libraries, a right, a device, the history of the repository.
-MAY_SKIP = {'rerun', 'cyclonedds', 'not a git checkout',
+# What a machine may lack: optional libraries, a browser, a right, a device, the history of the
+# repository.
+MAY_SKIP = {'rerun', 'cyclonedds', 'no browser prints pages here', 'not a git checkout',
             'mounting a file system is not allowed here', 'there is no device that is full'}
 
 

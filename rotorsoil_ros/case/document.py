@@ -270,6 +270,18 @@ def _index(place: Any, step: str, *, known: str, source: str) -> int:
     return int(step)
 
 
+def at(content: Any, path: str) -> Any:
+    """Return what a document says at a key path, None where it says nothing."""
+    for step in path.split('.'):
+        if isinstance(content, list) and step.isdigit() and int(step) < len(content):
+            content = content[int(step)]
+        elif isinstance(content, Mapping):
+            content = content.get(step)
+        else:
+            return None
+    return content
+
+
 def text_of(content: Mapping[str, Any], comments: Iterable[str]) -> str:
     """Return the YAML of a case: comments first, then one line for what fits into one."""
     head = [f'# {line}'.rstrip() for line in comments]
@@ -278,7 +290,7 @@ def text_of(content: Mapping[str, Any], comments: Iterable[str]) -> str:
 
 def _block(content: Mapping[str, Any], indent: str) -> Iterable[str]:
     for key, value in content.items():
-        line = f'{indent}{key}: {_flow(value)}'
+        line = f'{indent}{key}: {flow(value)}'
         if not isinstance(value, (dict, list)) or not value or (
                 len(line) <= _LONGEST_LINE and not _holds_mappings(value)):
             yield line
@@ -295,7 +307,7 @@ def _block(content: Mapping[str, Any], indent: str) -> Iterable[str]:
 
 def _entry(entry: Mapping[str, Any], indent: str) -> Iterable[str]:
     """Yield an entry of a list; the first of its lines gets the dash."""
-    line = f'{indent}- {_flow(entry)}'
+    line = f'{indent}- {flow(entry)}'
     if len(line) <= _LONGEST_LINE:
         yield line
         return
@@ -311,9 +323,10 @@ def _holds_mappings(value: Any) -> bool:
     return isinstance(value, dict) and any(_holds_mappings(entry) for entry in value.values())
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
+    """Return a value as YAML writes it in one line."""
     if isinstance(value, Mapping):
-        return '{' + ', '.join(f'{key}: {_flow(entry)}' for key, entry in value.items()) + '}'
+        return '{' + ', '.join(f'{key}: {flow(entry)}' for key, entry in value.items()) + '}'
     if isinstance(value, (list, tuple)):
-        return '[' + ', '.join(map(_flow, value)) + ']'
+        return '[' + ', '.join(map(flow, value)) + ']'
     return str(value) if isinstance(value, str) else repr(value)

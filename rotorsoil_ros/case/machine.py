@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 import math
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from rotorsoil_ros.case.summary import band_contents, stability_doubts, undecide
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
+from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
@@ -23,6 +24,9 @@ from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.case.design.report import DesignReport
 
 # What a message holds of an answer, in a log that has to explain itself.
 UNITS = {
@@ -254,15 +258,50 @@ class Machine:
             If nothing of the case is uncertain, so that there is no band.
 
         """
-        speed = rpm_to_rad_s(_numbers('rpm', rpm))
-        found = models.response_band(self.case, self.model, self.table, self.directory)
-        if found is None:
+        if self.envelope is None:
             raise InputError(f'{self.case.path}: support.model: {self.case.support.model} knows '
                              'of no soil and uncertainty says nothing else: there is no band')
-        nominal = self.table.predictor(self.case.unbalance).answer(speed)
-        bounds = found.envelope(self.case.unbalance).at(speed).around(nominal.displacement)
-        return Bounds(self.table.channels, speed, bounds.low, np.abs(nominal.displacement),
-                      bounds.high)
+        return self.bounds(rpm=rpm)
+
+    @cached_property
+    def envelope(self) -> Envelope | None:
+        """Between which responses the machine lies over its speed range; None without a band."""
+        found = models.response_band(self.case, self.model, self.table, self.directory)
+        return None if found is None else found.envelope(self.case.unbalance)
+
+    def bounds(self, *, rpm: Numbers) -> Bounds:
+        """Return the same as `band`; without a band NaN on both sides of the response."""
+        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        nominal = self.table.predictor(self.case.unbalance).answer(speed).displacement
+        if self.envelope is None:
+            none = np.full(nominal.shape, math.nan)
+            return Bounds(self.table.channels, speed, none, np.abs(nominal), none)
+        found = self.envelope.at(speed).around(nominal)
+        return Bounds(self.table.channels, speed, found.low, np.abs(nominal), found.high)
+
+    def report(self, *, rpm: float) -> 'DesignReport':
+        """
+        Judge whether the foundation is right for this machine at a speed.
+
+        Parameters
+        ----------
+        rpm : float
+            Running speed [rpm], within the speed range of the case.
+
+        Returns
+        -------
+        DesignReport
+            Verdict, housings, margins, what decides and what to do next.
+
+        Raises
+        ------
+        InputError
+            If the speed is beyond the speed range of the case.
+
+        """
+        from rotorsoil_ros.case.design.study import design_report  # half of it is words
+
+        return design_report(self, float(_numbers('rpm', rpm)[0]))
 
     def predict(self, profile: Profile) -> Response:
         """

@@ -24,7 +24,7 @@ from rotorsoil_ros.machine.band import (
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
-from rotorsoil_ros.machine.spread import SoilSpread
+from rotorsoil_ros.machine.spread import Place, SoilSpread
 
 # Rectangles that are longer than any that was measured are taken to be off by this.
 _LARGEST_MAPPING = 0.5
@@ -187,16 +187,27 @@ def response_band(
                    with_stiffer=any(stiffer))
     others = []
     for place, on_solved, on_stiffer in islice(forms, spread.samples - 1):
-        machine, solved_on = spread.machine(model, place), []
-        if case.soil is not None and with_soil:
-            soil = spread.soil(case.soil, place,
-                               highest_poisson_ratio=highest_poisson_ratio(model))
-            [machine] = on_soils(machine, [soil])
-            solved_on = [on_soil(one, soil, block.contact) for one, block
-                         in zip(elements, model.foundations, strict=False)]
+        machine = machine_at(case, model, spread, place)
+        solved_on = [on_soil(one, _soil_at(case.soil, model, spread, place), block.contact)
+                     for one, block in zip(elements, model.foundations, strict=False)
+                     if case.soil is not None]
         others.append(of_other_form(machine, solved=solved_on, stiffer=stiffer,
                                     takes_solved=on_solved, takes_stiffer=on_stiffer))
     return ResponseBand.build(table, others, unbalance_factor=spread.unbalance_factor)
+
+
+def machine_at(
+    case: Case, model: CoupledModel, spread: SoilSpread, place: Place,
+) -> CoupledModel:
+    """Return the machine at a place of a spread, on the soil that it has there."""
+    machine = spread.machine(model, place)
+    if case.soil is None or not depends_on_soil(model):
+        return machine
+    return on_soils(machine, [_soil_at(case.soil, model, spread, place)])[0]
+
+
+def _soil_at(soil: Soil, model: CoupledModel, spread: SoilSpread, place: Place) -> Soil:
+    return spread.soil(soil, place, highest_poisson_ratio=highest_poisson_ratio(model))
 
 
 def _forms(

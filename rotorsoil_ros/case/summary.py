@@ -7,6 +7,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.design.inputs import INPUTS
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
@@ -32,18 +33,11 @@ _LARGEST_A0_INCOMPRESSIBLE = 2.0
 _LARGEST_ASPECT = 2.0
 _LARGEST_POISSON_RATIO = 0.45
 
+# Told together, as G, nu and eta of the soil.
+_SOIL = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor')
+
 # Of the shaft's length: beyond, slopes are no longer small and no linear beam holds.
 _SURVIVED = 0.05
-
-
-# Of what the edges of a band hold besides the soil: in the words of an engineer.
-_UNCERTAIN = {
-    'soil_density_factor': 'density of the soil', 'bearing_stiffness_factor': 'bearing stiffness',
-    'bearing_damping_factor': 'bearing damping', 'pedestal_stiffness_factor': 'pedestals',
-    'foundation_mass_factor': 'mass of the foundation', 'rotor_mass_factor': 'mass of the discs',
-    'shaft_stiffness_factor': 'stiffness of the shaft', 'shaft_height_factor': 'shaft height',
-    'unbalance_factor': 'unbalance',
-}
 
 
 def derived_quantities(
@@ -114,8 +108,8 @@ def band_contents(case: Case) -> str:
     """Return what the edges of the band of a case hold; empty if it has none."""
     spread, knows_soil = case.uncertainty, (
         case.soil is not None and case.support.model in ('cone', 'infinite_elements'))
-    parts = [f'{what} (within a factor {getattr(spread, name):g})' for name, what
-             in _UNCERTAIN.items() if name in spread.inputs(with_soil=knows_soil)]
+    parts = [f'{INPUTS[name].words} (within a factor {getattr(spread, name):g})'
+             for name in spread.inputs(with_soil=knows_soil) if name not in _SOIL]
     if case.soil is None or not knows_soil:
         return '; '.join(parts)
     parts.insert(0, f'soil (G within a factor {spread.shear_modulus_factor:g}, nu within '

@@ -1,10 +1,10 @@
 """Natural frequencies and critical speeds, as CSV."""
 
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
 import math
 import sys
 
+from rotorsoil_ros.case.design.margins import separation_margins
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.summary import clipped, stability_doubts, unstable
 from rotorsoil_ros.cli.parser import PLANT
@@ -12,10 +12,7 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes.critical import asked, CriticalSpeed
-from rotorsoil_ros.machine.modes.names import ModeNames
-from rotorsoil_ros.machine.peaks import half_power_factors
+from rotorsoil_ros.machine.modes.critical import asked
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
 
@@ -70,8 +67,9 @@ def _criticals(arguments: Namespace, machine: Machine) -> int:
         header += ['amplification_factor', 'separation_margin', 'required_margin',
                    'half_power_factor', 'name']
         running = rpm_to_rad_s(arguments.running)
-        rows = [(*row, *margins) for row, margins
-                in zip(rows, _margins(machine.model, criticals, running), strict=True)]
+        rows = [(*row, one.critical.amplification_factor, one.margin, one.required,
+                 one.half_power_factor, one.name) for row, one in zip(
+            rows, separation_margins(machine.model, criticals, running), strict=True)]
     _tell_unstable(machine, high)
     if not rows:
         print(f'{machine.case.path}: no critical speed from {low:g} up to {high:g} rpm',
@@ -98,14 +96,3 @@ def _range_of(arguments: Namespace, machine: Machine) -> tuple[float, float]:
     for text in clipped(span, wanted):
         print(f'{text}; margins beyond are not known', file=sys.stderr)
     return rad_s_to_rpm(span[0]), rad_s_to_rpm(span[1])
-
-
-def _margins(
-    model: CoupledModel, criticals: Sequence[CriticalSpeed], running: float,
-) -> Iterator[tuple[float | str, ...]]:
-    """Yield factors, margins and name of each critical speed for a running speed [rad/s]."""
-    names = ModeNames(model)
-    for critical, half_power in zip(criticals, half_power_factors(model, criticals), strict=True):
-        yield (critical.amplification_factor, critical.separation_margin(running),
-               critical.required_margin(running, half_power=half_power), half_power,
-               names.of_critical(critical))

@@ -206,6 +206,11 @@ def _add_case_verbs(verbs: _Verbs) -> None:
     _add_new(verbs)
     _verb(verbs, 'check', 'report:check',
           'validate a case; print its derived quantities and warnings')
+    report = _verb(verbs, 'report', 'report:report',
+                   'judge on one page whether the foundation is right for the machine')
+    report.add_argument('--rpm', metavar='R', type=_rpm, required=True,
+                        help='running speed [rpm]')
+    _add_output(report, 'DIR', 'directory for report.html and report.json', default='report')
     _verb(verbs, 'tabulate', 'report:tabulate', 'compute or load the tables of a case')
     compliance = _verb(verbs, 'compliance', 'sweeps:compliance',
                        'write the compliance of the soil under a block as CSV')

@@ -8,6 +8,7 @@ import time
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.design.report import Acceptance
 from rotorsoil_ros.case.summary import (
     clipped,
     derived_quantities,
@@ -19,6 +20,7 @@ from rotorsoil_ros.case.summary import (
     warnings,
 )
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
@@ -60,6 +62,24 @@ def check(arguments: Namespace) -> int:
     for text in growing:
         print(f'error: {text}')
     return 1 if growing else 0
+
+
+def report(arguments: Namespace) -> int:
+    """Judge whether the foundation is right for the machine, on one page; print the verdict."""
+    from rotorsoil_ros.figures.design import write_design_report
+
+    machine = machine_of(arguments)
+    with progress('solving') as _:
+        found = machine.report(rpm=arguments.rpm)
+    out: Path = arguments.output
+    out.mkdir(parents=True, exist_ok=True)
+    with progress('drawing') as _:
+        write_design_report(machine, found, out)
+    print(f'verdict   {found.verdict}')
+    print(*(f'          {reason}' for reason in found.reasons), sep='\n')
+    print(f'next step {found.next_step}')
+    print(f'report    {out / "report.html"}')
+    return 0 if found.verdict == Acceptance.ACCEPTABLE else 1
 
 
 def tabulate(arguments: Namespace) -> int:

@@ -27,30 +27,35 @@ _CLOSE = 0.16
 _BESIDE, _ABOVE = 4, 26
 # Windings of a pedestal's spring.
 _WINDINGS = 4
+# A narrower picture has room for names only [inch].
+_SMALL = 5.0
 _EDGE: dict[str, Any] = {'edgecolor': 'black', 'linewidth': 0.6}
 _MEGA = 1e-6
 
 
-def machine_drawing(case: Case) -> Figure:
-    """Draw shaft, discs, bearings, blocks and ground of a case, side and end view."""
+def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
+    """Draw shaft, discs, bearings, blocks and ground of a case, in a width in inches."""
     left, right, reach, top = _extent(case)
     # Room for the labels of discs above, and of bearings to the right.
     depth = 0.1 * top
     across, up = right - left + 2.0 * reach, top + depth
-    figure = Figure(figsize=(7.5, min(max(1.9 + 6.2 * up / across, 2.9), 7.4)),
+    height = min(max(0.25 * width + 0.83 * width * up / across, 0.39 * width), 7.4)
+    figure = Figure(figsize=(width, height),
                     layout='constrained')
     # Widths in the ratio of the limits: then both views have one scale.
     side, end = figure.subplots(1, 2, width_ratios=[right - left, 2.0 * reach], sharey=True)
     side.set(xlim=(left, right), ylim=(-depth, top), xlabel='y along the shaft [m]',
              ylabel='z above the ground [m]')
     end.set(xlim=(-reach, reach), xlabel='x across [m]')
-    _draw_side(side, case)
+    _draw_side(side, case, in_full=width > _SMALL)
     _draw_end(end, case)
     for axes in (side, end):
         axes.set_aspect('equal')
         axes.locator_params(axis='x', nbins=6 if axes is side else 3)
         axes.spines[['top', 'right']].set_visible(False)
         _draw_ground(axes, rigid=case.support.model == 'rigid')
+    if width <= _SMALL:
+        return figure
     given = all(block.height is not None for block in case.foundations)
     note = '' if given else ', heights of blocks after their centre of gravity'
     figure.suptitle(f'{case.name}: {_support(case)}\nto scale, discs as solid cylinders of their '
@@ -81,7 +86,7 @@ def _support(case: Case) -> str:
             f'{case.soil.shear_wave_speed:.0f} m/s')
 
 
-def _draw_side(axes: Axes, case: Case) -> None:
+def _draw_side(axes: Axes, case: Case, *, in_full: bool) -> None:
     rotor, shaft = case.rotor, case.rotor.shaft_height
     for block in case.foundations:
         half, height = _half_length(block), block.drawn_height
@@ -95,7 +100,8 @@ def _draw_side(axes: Axes, case: Case) -> None:
         _draw_support(axes, bearing, bearing.position, width=size, foot=foot, shaft=shaft,
                       size=size)
         # At the foot: clear of the discs above and of the block's name.
-        axes.annotate(_words(bearing), (bearing.position + 0.5 * size, foot), xytext=(3, 4),
+        words = _words(bearing) if in_full else bearing.name
+        axes.annotate(words, (bearing.position + 0.5 * size, foot), xytext=(3, 4),
                       textcoords='offset points', fontsize=6.5, va='bottom', zorder=7)
     _draw_shaft(axes, case)
     _draw_discs(axes, case)

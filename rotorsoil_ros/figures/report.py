@@ -1,6 +1,5 @@
 """A comparison on one page that needs nothing beside it."""
 
-import base64
 from collections.abc import Iterable, Sequence
 import csv
 from html import escape
@@ -13,35 +12,17 @@ import re
 import numpy as np
 
 import rotorsoil_ros
+from rotorsoil_ros.figures import html
 from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.passage import Passage
 from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rad_s_to_rpm
 
-_STYLE = """
-body { font: 14px/1.45 sans-serif; color: #222; max-width: 62rem; margin: 1.5rem auto;
-       padding: 0 1rem; }
-h1 { font-size: 1.4rem; } h2 { font-size: 1.1rem; margin-top: 1.6rem; }
-.verdict { padding: .5rem .8rem; border-left: .4rem solid; }
-.passes { border-color: #009e73; background: #e8f6f1; }
-.fails { border-color: #c0392b; background: #fbecea; }
-.undecided { border-color: #e69f00; background: #fdf5e3; }
-table { border-collapse: collapse; margin: .4rem 0; }
-th, td { border: 1px solid #ccc; padding: .15rem .5rem; text-align: right; font-size: 12px; }
-th, td:first-child { text-align: left; background: #f5f5f5; }
-td.zone-A { background: #cdebd8; } td.zone-B { background: #e8f0c4; }
-td.zone-C { background: #fbe3b3; } td.zone-D { background: #f5c1bb; }
-pre { white-space: pre-wrap; font-size: 12px; background: #f5f5f5; padding: .5rem .8rem; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(24rem, 1fr));
-            gap: 1rem; align-items: start; }
-figure { margin: 0; break-inside: avoid; } figure img { width: 100%; }
-figcaption { font-size: 12px; color: #555; }
-"""
-
 _DPI = 110
 _LONGEST_NAME = 100
-ZONES = ('A', 'B', 'C', 'D')
+
+_KINDS = {Verdict.PASSES: 'good', Verdict.FAILS: 'bad', Verdict.UNDECIDED: 'open'}
 
 _WORDS = {
     Verdict.PASSES: 'The machine behaves as predicted.',
@@ -118,36 +99,30 @@ def page(
         f'<h1>{escape(title)}</h1>',
         f'<p>Log {escape(source)}; case {escape(case.name)}, {escape(str(case.path))}; '
         f'rotorsoil_ros {rotorsoil_ros.__version__}.</p>',
-        f'<div class="verdict {verdict}"><b>{verdict}</b>: {_WORDS[verdict]}'
-        f'{_list(comparison.failures)}</div>',
+        html.verdict(_KINDS[verdict], str(verdict), _WORDS[verdict], comparison.failures),
     ]
     if comparison.remarks:
-        parts.append(f'<h2>To be known</h2>{_list(comparison.remarks)}')
-    parts += ['<h2>Channels</h2>', _table(*channel_table(comparison))]
-    parts.append(_list(exclusions(comparison)))
+        parts.append(f'<h2>To be known</h2>{html.listed(comparison.remarks)}')
+    parts += ['<h2>Channels</h2>', html.table(*channel_table(comparison))]
+    parts.append(html.listed(exclusions(comparison)))
     if comparison.peaks:
-        parts += ['<h2>Peaks</h2>', _table(*peak_table(comparison))]
+        parts += ['<h2>Peaks</h2>', html.table(*peak_table(comparison))]
     if comparison.expectation.criticals:
-        parts += ['<h2>Critical speeds of the model</h2>', _table(
+        parts += ['<h2>Critical speeds of the model</h2>', html.table(
             ['speed [rpm]', 'whirl', 'damping ratio'],
             [[f'{rad_s_to_rpm(mode.speed):.0f}', 'forward' if mode.whirl > 0 else 'backward',
               f'{mode.damping_ratio:.3g}'] for mode in comparison.expectation.criticals])]
     if comparison.zones:
         parts += [f'<h2>Zones, {escape(comparison.rules.zones.label)}</h2>',
                   '<p>Velocity of the 1X vector alone, a lower bound of the broadband value.</p>',
-                  _table(*zone_table(comparison))]
+                  html.table(*zone_table(comparison))]
     if identification:
         text = escape('\n'.join(identification))
         parts += ['<h2>Identification</h2>', f'<pre>{text}</pre>']
     parts.append('<h2>Pictures</h2><div class="pictures">')
-    for caption, png in pictures:
-        image = base64.b64encode(png).decode()
-        parts.append(f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{image}">'
-                     f'<figcaption>{escape(caption)}</figcaption></figure>')
+    parts += [html.png(image, caption) for caption, image in pictures]
     parts.append('</div>')
-    return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>'
-            f'{escape(title)}</title><style>{_STYLE}</style></head><body>\n'
-            + '\n'.join(parts) + '\n</body></html>\n')
+    return html.page(title, parts)
 
 
 def channel_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
@@ -207,19 +182,3 @@ def _speed(passage: Passage | None) -> str:
 
 def _height(passage: Passage | None) -> str:
     return '-' if passage is None else _number(1e6 * passage.amplitude)
-
-
-def _list(lines: Sequence[str]) -> str:
-    return ''.join(['<ul>', *(f'<li>{escape(line)}</li>' for line in lines), '</ul>']
-                   if lines else [])
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = ''.join(f'<th>{escape(cell)}</th>' for cell in header)
-    body = ''.join(f'<tr>{"".join(map(_cell, cells))}</tr>' for cells in rows)
-    return f'<table><tr>{head}</tr>{body}</table>'
-
-
-def _cell(text: str) -> str:
-    kind = f' class="zone-{text}"' if text in ZONES else ''
-    return f'<td{kind}>{escape(text)}</td>'

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotorsoil_ros.case import document
+from rotorsoil_ros.case.authoring.comments import edited
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.monitor.identification.case import (
     COUPLE,
@@ -125,21 +126,38 @@ def _trades(found: Identification) -> Iterator[str]:
                        f'{"ratio" if correlation[row, column] > 0.0 else "product"} is told')
 
 
+_HEAD = ('# With what `rotorsoil compare` identified from a measured run: effective values,\n'
+         '# which hold for this model and this run.\n')
+
+
 def write_case(found: Identification, target: Path) -> None:
-    """Write the case as described with what was identified; its comments are lost."""
+    """Write the case as described with what was identified, its comments kept."""
     content = deepcopy(dict(found.case.content))
     document.override(content, found.settings)
-    own = [entry for entry in content.get('unbalances') or []
-           if entry['disc'] not in found.columns]
-    content['unbalances'] = own + list(_entries(found))
+    entries = {entry['disc']: entry for entry in _entries(found)}
+    own = content.get('unbalances') or []
+    # Each in the place of the first that its disc has; of several the others are gone.
+    kept = [entries.pop(entry['disc'], None) if entry['disc'] in found.columns else entry
+            for entry in own]
+    content['unbalances'] = [entry for entry in kept if entry is not None] + list(
+        entries.values())
     for entry in (content.get('support'), *(content.get('foundations') or [])):
         for key in ('file', 'stiffness_file'):
             if isinstance(entry, dict) and isinstance(entry.get(key), str):
                 entry[key] = str((found.case.path.parent / entry[key]).resolve())
-    target.write_text(document.text_of(content, [
-        f'{found.case.path.name}, with what `rotorsoil compare` identified from a measured run.',
-        'Effective values: they hold for this model and this run.']), encoding='utf-8')
+    text = _written(found.case.path)
+    text = document.text_of(content, []) if text is None else edited(text, content)
+    target.write_text(text if text.startswith(_HEAD) else _HEAD + text, encoding='utf-8')
     load(target)
+
+
+def _written(path: Path) -> str | None:
+    """Return the text of a case file; None where a case came from elsewhere."""
+    try:
+        text = path.read_text(encoding='utf-8')
+    except OSError:
+        return None
+    return text
 
 
 def _entries(found: Identification) -> Iterator[dict[str, Any]]:

@@ -1,0 +1,53 @@
+"""What may be uncertain of a machine, in the words of an engineer, and how one knows it better."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class UncertainInput:
+    """One input: how it is called, what its lower and its higher end are, how to know it."""
+
+    words: str
+    low: str
+    high: str
+    advice: str
+
+
+# By the key of `uncertainty` that says how badly it is known.
+INPUTS = {
+    'shear_modulus_factor': UncertainInput(
+        'stiffness of the soil', 'softest soil', 'stiffest soil',
+        'measure the velocity of shear waves on site (MASW, cross-hole or seismic cone)'),
+    'poisson_ratio': UncertainInput(
+        "Poisson's ratio of the soil", 'lowest nu', 'highest nu',
+        'ask for the ground water level: below it take 0.49 for clay'),
+    'loss_factor': UncertainInput(
+        'damping of the soil', 'least damping', 'most damping',
+        'ask for a resonant column test of the soil'),
+    'soil_density_factor': UncertainInput(
+        'density of the soil', 'lightest soil', 'heaviest soil', 'take it from the soil report'),
+    'bearing_stiffness_factor': UncertainInput(
+        'bearing stiffness', 'softest bearings', 'stiffest bearings',
+        'ask the maker of the bearings for their stiffness at this load'),
+    'bearing_damping_factor': UncertainInput(
+        'bearing damping', 'least bearing damping', 'most bearing damping',
+        'ask the maker of the bearings for their damping at this speed'),
+    'pedestal_stiffness_factor': UncertainInput(
+        'stiffness of the pedestals', 'softest pedestals', 'stiffest pedestals',
+        'strike the pedestals with an instrumented hammer, or compute them from their drawing'),
+    'foundation_mass_factor': UncertainInput(
+        'mass of the foundation', 'lightest foundation', 'heaviest foundation',
+        'take the mass of what stands on the block from its drawings'),
+    'rotor_mass_factor': UncertainInput(
+        'mass of the rotor', 'lightest rotor', 'heaviest rotor',
+        'take mass and inertia of the rotor from its drawing, or weigh it'),
+    'shaft_stiffness_factor': UncertainInput(
+        'bending stiffness of the shaft', 'most slender shaft', 'stoutest shaft',
+        'take diameters and distances of the bearings from the shaft drawing'),
+    'shaft_height_factor': UncertainInput(
+        'height of the shaft', 'lowest shaft', 'highest shaft',
+        'take the height of the shaft from the general arrangement drawing'),
+    'unbalance_factor': UncertainInput(
+        'unbalance', 'least unbalance', 'most unbalance',
+        'agree a balance grade with the maker, and balance the rotor in place'),
+}
