@@ -20,7 +20,7 @@ from rotorsoil_ros.figures import html
 from rotorsoil_ros.figures.comparison import ZONE_COLOURS
 from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.figures.response import COLOURS, tidy
-from rotorsoil_ros.ground.soil import Circle
+from rotorsoil_ros.ground.soil import extents
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s, to_mm_s_rms, to_um_pp
 
@@ -155,9 +155,8 @@ def _given(report: DesignReport) -> Iterator[str]:
                f'{1e-6 * case.soil.shear_modulus:.3g} MPa' + mark('soil'))
     for index, block in enumerate(case.foundations):
         place = f'foundations.{index}'
-        contact = block.contact
-        plan = (f'radius {contact.radius:.4g}' if isinstance(contact, Circle) else
-                f'{2.0 * contact.half_width:.4g} x {2.0 * contact.half_length:.4g}')
+        (left, right), (near, far) = extents(block.contact)
+        plan = f'{right - left:.4g} x {far - near:.4g}'
         yield (f'{block.name}: {plan} x {block.drawn_height:.3g} m'
                f'{mark(f"{place}.height", f"{place}.half_width")}, {block.mass:.4g} kg'
                f'{mark(f"{place}.mass")}')

@@ -1,6 +1,7 @@
 """What speaks against a machine, what is not known of it, and what to do next."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 import math
 from typing import TYPE_CHECKING
@@ -161,12 +162,10 @@ def _remedies(machine: 'Machine', worst: HousingAnswer) -> list[str]:
         return []
     said = [f'Balanced one grade better the worst housing would have '
             f'{_MM * now / _GRADE_STEP:.3g} instead of {_MM * now:.3g} mm/s']
-    try:
+    with suppress(RotorSoilError):  # such a block may be beyond the reach of its ground
         larger = larger_block(model, _LARGER)
-    except RotorSoilError:  # such a block is beyond the reach of the model of the ground
-        return said
-    there = velocity(case, larger, speed=worst.speed,
-                     channel=model.channels.index(worst.channel))
-    if case.support.model not in ('rigid', 'table') and math.isfinite(there):
-        said.append(f'on a block {_LARGER - 1.0:.0%} longer and wider {_MM * there:.3g} mm/s')
+        there = math.nan if larger is None else velocity(
+            case, larger, speed=worst.speed, channel=model.channels.index(worst.channel))
+        if math.isfinite(there):
+            said.append(f'on a block {_LARGER - 1.0:.0%} longer and wider {_MM * there:.3g} mm/s')
     return said

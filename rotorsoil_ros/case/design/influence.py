@@ -11,7 +11,10 @@ from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import INPUTS, UncertainInput
 from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.neighbours import on_soil
+from rotorsoil_ros.ground.plan import Part, Plan
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
 from rotorsoil_ros.machine.band import depends_on_soil
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -139,12 +142,20 @@ def velocity(case: Case, model: CoupledModel, *, speed: float, channel: int) -> 
     return float(abs(found[0, channel])) / math.sqrt(2.0)
 
 
-def larger_block(model: CoupledModel, factor: float) -> CoupledModel:
-    """Return a machine whose blocks are longer and wider by a factor, of the same height."""
+def larger_block(model: CoupledModel, factor: float) -> CoupledModel | None:
+    """
+    Return a machine whose blocks are longer and wider by a factor, of the same height.
+
+    None where its ground would have to be solved anew.
+    """
     blocks = tuple(_larger(block, factor) for block in model.foundations)
+    if not blocks or not all(isinstance(soil, (ConeModel, InfiniteElementModel))
+                             for soil in model.soil_models):
+        return None
     return replace(model, foundations=blocks, soil_models=tuple(
-        on_soil(soil, soil.soil, block.contact) if hasattr(soil, 'soil') else soil
-        for soil, block in zip(model.soil_models, blocks, strict=True)))
+        on_soil(soil, soil.soil, block.contact) for soil, block
+        in zip(model.soil_models, blocks, strict=True)
+        if isinstance(soil, (ConeModel, InfiniteElementModel))))
 
 
 def _larger(block: Foundation, factor: float) -> Foundation:
@@ -157,5 +168,7 @@ def _larger(block: Foundation, factor: float) -> Foundation:
 def _scaled(contact: Contact, factor: float) -> Contact:
     if isinstance(contact, Circle):
         return Circle(factor * contact.radius)
-    assert isinstance(contact, Rectangle)
-    return Rectangle(factor * contact.half_width, factor * contact.half_length)
+    if isinstance(contact, Rectangle):
+        return Rectangle(factor * contact.half_width, factor * contact.half_length)
+    return Plan(tuple(Part(factor * part.half_width, factor * part.half_length, factor * part.x,
+                           factor * part.y) for part in contact.parts))
