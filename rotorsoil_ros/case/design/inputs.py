@@ -5,7 +5,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class UncertainInput:
-    """One input: how it is called, what its lower and its higher end are, how to know it."""
+    """
+    One input of a machine that may not be known.
+
+    Attributes
+    ----------
+    words : str
+        How it is called.
+    low, high : str
+        What its lower and its higher end are called.
+    advice : str
+        How one gets to know it better.
+
+    """
 
     words: str
     low: str
