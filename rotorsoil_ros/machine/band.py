@@ -102,11 +102,6 @@ class Envelope:
         found = bounds[index:index + 1] + share * (bounds[index + 1] - bounds[index])
         return Envelope(speed, found[:, 0], found[:, 1], found[:, 2], found[:, 3])
 
-    def holds(self, response: ComplexArray) -> BoolArray:
-        """Return whether each amplitude, (n, c), lies in the band; NaN does not."""
-        size = np.abs(response)
-        return np.asarray((size >= self.low) & (size <= self.high))
-
 
 @dataclass(frozen=True)
 class ResponseBand:

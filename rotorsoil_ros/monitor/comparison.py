@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.passage import PeakPair
 from rotorsoil_ros.monitor.points import ChannelPoints, Statistics, statistics
@@ -90,13 +89,13 @@ class Comparison:
 
     @property
     def verdict(self) -> Verdict:
-        """What is to be said in one word: nothing good of a machine that is unstable."""
-        return Verdict.FAILS if self.failures else self.account.verdict()
+        """What is to be said in one word."""
+        return self.account.verdict()
 
     @property
     def failures(self) -> list[str]:
-        """What speaks against the machine; that its case is unstable before all else."""
-        return [*unstable(self.expectation.table.stability), *self.account.failures()]
+        """What speaks against the machine."""
+        return self.account.failures()
 
     @property
     def peaks(self) -> list[PeakPair]:

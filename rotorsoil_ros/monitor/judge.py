@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.events import (
     Band,
@@ -75,7 +76,8 @@ class Judge:
         self._band = BandShare(judging.rules)
         self._zones = Zones(judging.rules.zones, predictor.channels)
         self._sweeps = Sweeps(machine, judging.rules)
-        self.account = Account(judging.rules, self._band, self._zones, self._sweeps)
+        self.account = Account(judging.rules, self._band, self._zones, self._sweeps,
+                               of_case=list(unstable(predictor.table.stability)))
         self._teller = Teller(machine, self.account)
         self._unknown: set[Channel] = set()
         self._told: set[Channel] = set()

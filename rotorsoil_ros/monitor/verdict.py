@@ -28,8 +28,12 @@ class Verdict(StrEnum):
 class Account:
     """What a judge has found out about a run so far: shares, peaks, zones, and what they say."""
 
-    def __init__(self, rules: Rules, band: BandShare, zones: Zones, sweeps: Sweeps) -> None:
+    def __init__(
+        self, rules: Rules, band: BandShare, zones: Zones, sweeps: Sweeps, *,
+        of_case: Sequence[str] = (),
+    ) -> None:
         self.rules, self.band, self.zones, self.sweeps = rules, band, zones, sweeps
+        self._of_case = of_case
 
     @property
     def inside(self) -> dict[Channel, float]:
@@ -47,11 +51,12 @@ class Account:
         return self.zones.worst()
 
     def failures(self) -> list[str]:
-        """Return what speaks against the machine, each in one line."""
+        """Return what speaks against the machine, each in one line; first what its case says."""
         rules = self.rules
-        found = [f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the band, '
-                 f'{100 * rules.inside_share:.0f} % should'
-                 for channel, share in self.inside.items() if share < rules.inside_share]
+        found = [*self._of_case]
+        found += [f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the band, '
+                  f'{100 * rules.inside_share:.0f} % should'
+                  for channel, share in self.inside.items() if share < rules.inside_share]
         found += [fault for peak in self.peaks
                   if (fault := peak_fault(peak, margin=rules.critical_margin))]
         found += [f'{entry.channel}: zone D, {MM * entry.velocity:.2f} mm/s rms measured at '
