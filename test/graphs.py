@@ -57,6 +57,13 @@ class Graph:
         self.executor.add_node(node)
         return node
 
+    def use(self, executor):
+        """Have everybody spun by another executor."""
+        self.executor.shutdown()
+        self.executor = executor(context=self.context)
+        for node in self.nodes:
+            self.executor.add_node(node)
+
     def until(self, holds, what='what was awaited'):
         """Spin until something holds; fail at the deadline."""
         deadline = time.monotonic() + DEADLINE_S

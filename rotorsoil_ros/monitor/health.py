@@ -11,11 +11,11 @@ from rotorsoil_ros.units import rad_s_to_rpm
 STANDING, STANDSTILL = 'standing', 1e-3
 GAPS = ('nan', 'infinite', 'negative', 'below_table', 'above_table', 'unstable',
         'unresolved')
-FAULTS = (*GAPS, 'malformed', 'velocity_missing', 'stamp_missing')
+FAULTS = (*GAPS, 'malformed', 'velocity_missing', 'stamp_missing', 'dropped')
 REDATED = ('stamp_not_set', 'stamp_far_off')  # answered at the time of reception
 STAMPS = ('repeated_stamp', 'backward_stamp')  # answered all the same
 COUNTED = ('received', 'answered', STANDING, *FAULTS, 'joint_missing', *REDATED, *STAMPS,
-           'measured', 'samples')
+           'measured', 'samples', 'measurements_dropped')
 
 
 MOST_SAID = 16

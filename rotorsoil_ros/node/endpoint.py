@@ -17,6 +17,7 @@ from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.hearing import greeting, Hearing
 from rotorsoil_ros.node.interfaces import message_class
+from rotorsoil_ros.node.numbered import Numbered
 from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
@@ -49,6 +50,7 @@ class Watch:
         self._machine = machine
         self._settings = settings
         self._subscriptions: list[Any] = []
+        self._numbered: dict[str, Numbered] = {}
         self._log, self._bench = log, bench
         self._arrival = Arrival(lambda: int(node.get_clock().now().nanoseconds))
         self._topics = self._publish(diagnostics)
@@ -81,6 +83,8 @@ class Watch:
         if self.is_active:
             self._hear_sensors(topics)
             self._look_who_speaks()
+            for topic, numbered in self._numbered.items():
+                numbered.hear_of(self._node.count_publishers(topic))
             self.monitor.tick(now_ns, stale_after_s=stale_after_s)
 
     def take_unbalance(self, now_ns: int) -> None:
@@ -184,7 +188,8 @@ class Watch:
     def _hear(self, name: str, kind: str, *, depth: int) -> None:
         """Subscribe to what is measured."""
         topic = str(self._node.resolve_topic_name(f'{self.name}/{name}'))
-        self._take(inlet(name, topic, self.monitor, log=self._log.write), topic, kind, depth)
+        self._take(inlet(name, topic, self.monitor, log=self._log.write), topic, kind, depth,
+                   lost_as='measurements_dropped')
 
     def _hear_speed(self, name: str, topic: str, kind: str, told: str) -> None:
         """Subscribe to what tells the speed; it is logged as a plain node would hear it."""
@@ -192,17 +197,23 @@ class Watch:
             self._node.resolve_topic_name(f'{self.name}/joint_states'))
         self._take(inlet(name, plain, self.monitor, log=self._log.write, speed=self._speed,
                          message_type=kind, told=told),
-                   topic, kind, self._settings.value('speed_depth'))
+                   topic, kind, self._settings.value('speed_depth'), lost_as='dropped')
 
-    def _take(self, taken_in: Inlet, topic: str, kind: str, depth: int) -> None:
+    def _take(self, taken_in: Inlet, topic: str, kind: str, depth: int, *, lost_as: str) -> None:
         reliability = ReliabilityPolicy[self._settings.value('speed_reliability').upper()]
+        self._numbered[topic] = numbered = Numbered(
+            partial(self._receive, taken_in), partial(self._miss, lost_as))
         self._subscriptions.append(self._node.create_subscription(
-            message_class(kind), topic, partial(self._receive, taken_in),
+            message_class(kind), topic, numbered,
             QoSProfile(depth=depth, reliability=reliability), raw=True))
 
     def _receive(self, taken_in: Inlet, cdr: bytes) -> None:
         if self.is_active:
             taken_in(self._arrival, (cdr,))
+
+    def _miss(self, reason: str, count: int) -> None:
+        if self.is_active:
+            self.monitor.health.note(reason, count)
 
     def _send(self, records: Records) -> None:
         if self.is_active:

@@ -13,6 +13,8 @@ from mcap.reader import NonSeekingReader
 import numpy as np
 import pytest
 from rcl_interfaces.srv import DescribeParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -57,6 +59,26 @@ def test_every_speed_of_a_burst_is_answered_in_order(bench):
         bench.graph.executor.spin_once(timeout_sec=0.001)
     bench.graph.until(lambda: len(amplitude) == 200, 'every answer')
     assert [stamp_ns(message) - STAMP for message in amplitude] == list(range(200))
+
+
+@pytest.mark.parametrize('executor', [EventsExecutor, SingleThreadedExecutor])
+def test_speeds_that_find_no_room_are_counted_and_told(bench, executor):
+    bench.graph.use(executor)
+    node = bench.active('fan', speed_depth=10)
+    reports = bench.hear('/diagnostics', DiagnosticArray)
+    amplitude, _ = bench.answers()
+    publish = bench.speaker()
+    publish(joint_state([300.0]))
+    bench.graph.until(lambda: amplitude, 'the first answer')
+    for step in range(1, 201):  # while nobody takes them
+        publish(joint_state([300.0], stamp=STAMP + step))
+    counts = node._watches[0].monitor.health.counts
+    bench.graph.until(lambda: stamp_ns(amplitude[-1]) == STAMP + 200, 'the last answer')
+    assert counts['received'] < 201
+    assert counts['received'] + counts['dropped'] == 201
+    bench.graph.until(lambda: any(f'{counts["dropped"]} dropped' in status.message
+                          and status.level == Level.WARN.value.to_bytes()
+                          for report in reports for status in report.status), 'a warning')
 
 
 @pytest.mark.parametrize('speed', [math.nan, math.inf, -300.0, 0.0, 1e9])
