@@ -37,6 +37,7 @@ from rotorsoil_ros.screen.trends import TrendLines, ZoneLane
 from rotorsoil_ros.screen.waterfall import ORDERS, Waterfall
 
 APPLICATION = 'rotorsoil'
+LAYOUT = 'layout.rrd'
 HELD_NS = 5 * NANOSECONDS  # of a run that nobody looks at: a chunk costs a kilobyte
 TEXT_LEVELS = {Level.OK: 'INFO', Level.WARN: 'WARN', Level.ERROR: 'ERROR', Level.STALE: 'WARN'}
 
@@ -56,6 +57,7 @@ class RerunSink:
         self._held_ns = 0 if url else HELD_NS
         self._basis: dict[tuple[str, type], Model | Expected] = {}
         self._views: dict[str, MachineView] = {}
+        self._layout = b''
         self.begin(path)
 
     def begin(self, path: Path | None) -> None:
@@ -69,12 +71,23 @@ class RerunSink:
         if not file and not viewer:  # the disk takes none yet: rerun would keep all in memory
             self._views = {}
             return
-        self._stream.set_sinks(*file, *viewer, default_blueprint=blueprint(self._shown))
+        self._attach([*file, *viewer])
         recording = Recording(self._stream)
         self._views = {name: MachineView(recording, self._shown[name], machine)
                        for name, machine in self._machines.items()}
         for basis in self._basis.values():  # on which what follows rests
             self(basis)
+
+    def _attach(self, sinks: list[rr.FileSink | rr.GrpcSink]) -> None:
+        """Stream to sinks from now on, which open with the layout of the views."""
+        if self._layout:
+            # Given as an object it would cost two threads and megabytes each time, for ever.
+            self._stream.set_sinks(*sinks)
+            self._stream.log_file_from_contents(LAYOUT, self._layout)
+        else:  # the first may be so short that bytes, which a thread reads, would come too late
+            layout = blueprint(self._shown)
+            self._stream.set_sinks(*sinks, default_blueprint=layout)
+            self._layout = packed(self._stream, layout)
 
     def __enter__(self) -> 'RerunSink':
         return self
@@ -109,6 +122,15 @@ class RerunSink:
         for view in self._views.values():
             view.flush()
         self._stream.disconnect()
+
+
+def packed(stream: rr.RecordingStream, layout: rr.blueprint.Blueprint) -> bytes:
+    """Return a layout as a part of a stream, to be sent as often as it begins a file."""
+    aside = rr.RecordingStream(APPLICATION, recording_id=stream.get_recording_id())
+    memory = aside.memory_recording()
+    aside.send_blueprint(layout, make_active=False, make_default=True)
+    said = memory.drain_as_bytes()
+    return bytes(said) if said else b''
 
 
 class MachineView:
