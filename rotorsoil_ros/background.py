@@ -16,8 +16,9 @@ from rotorsoil_ros.errors import BAD_INPUT, RotorSoilError
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
-BACKLOG = 10  # batches, one each second; what a stuck viewer does not take is dropped
+BACKLOG = 10  # batches, some seconds; what a stuck viewer does not take is dropped
 PATIENCE_S = 2.0  # at the end
+OPENING_S = 5.0  # that a start waits for what hangs
 GLANCE_S = 0.002  # at a child whose pipe has to be emptied
 NICE = 10  # how far a child stands back behind answers
 
@@ -27,22 +28,30 @@ class Aside(Generic[Item]):
     Hands batches to a thread.
 
     Neither work that hangs nor work that raises is ever noticed by who calls, except that it
-    is told once.
+    is told once. What has to be opened before is opened by the thread: who calls waits for it
+    only as long as it takes where nothing hangs.
     """
 
     def __init__(
         self, take: Callable[[list[Item]], None], finish: Callable[[], None], *,
         complain: Callable[[str], object], name: str = 'the viewer', done: str = 'shown',
         backlog: int = BACKLOG, patience_s: float = PATIENCE_S,
+        begin: Callable[[], object] = lambda: None,
     ) -> None:
         self.has_failed = False
+        self._begin, self._begun = begin, threading.Event()
         self._take, self._finish, self._complain = take, finish, complain
         self._name, self._done, self._patience_s = name, done, patience_s
         self._items: list[Item] = []
         self._batches: queue.Queue[list[Item] | None] = queue.Queue(backlog)
         self._is_behind = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self._thread.start()
+        try:
+            self._thread.start()
+        except RuntimeError as error:  # the limit of threads
+            self._fail(error)
+        if not self.has_failed and not self._begun.wait(OPENING_S):
+            complain(f'{name} hangs while it is opened: what comes waits for it')
 
     def __call__(self, item: Item) -> None:
         """Collect one for the next batch."""
@@ -82,7 +91,8 @@ class Aside(Generic[Item]):
             self._batches.get_nowait()  # the end has to fit in
             self._batches.put_nowait(None)
             taken = False
-        self._thread.join(patience_s if taken else 0.0)
+        if self._thread.ident is not None:
+            self._thread.join(patience_s if taken else 0.0)
         if self._thread.is_alive():
             if rerun := sys.modules.get('rerun'):
                 rerun.unregister_shutdown()  # at its exit it would wait for the same viewer
@@ -91,12 +101,18 @@ class Aside(Generic[Item]):
 
     def _run(self) -> None:
         try:
+            self._begin()
+            self._begun.set()
             while (batch := self._batches.get()) is not None:
                 self._take(batch)
             self._finish()
-        except (OSError, RuntimeError, ValueError, OverflowError) as error:
-            self.has_failed = True
-            self._complain(f'{self._name} failed and nothing more is {self._done}: {error}')
+        except (RotorSoilError, OSError, RuntimeError, ValueError, OverflowError) as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        self.has_failed = True
+        self._begun.set()
+        self._complain(f'{self._name} failed and nothing more is {self._done}: {error}')
 
 
 class Child:
@@ -108,7 +124,7 @@ class Child:
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
         self.failure = ''
-        self.said = ''
+        self.lines: list[str] = []
         self._process: subprocess.Popen[bytes] | None = None
         try:
             self._process = subprocess.Popen(
@@ -121,6 +137,11 @@ class Child:
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, self._process.pid, NICE)
 
+    @property
+    def said(self) -> str:
+        """The last line that the child has told."""
+        return self.lines[-1] if self.lines else ''
+
     def has_ended(self, *, wait_s: float = GLANCE_S) -> bool:
         """Read what the child says; return whether it has ended, and wait for it so long."""
         if self._process is None:
@@ -130,8 +151,7 @@ class Child:
         except subprocess.TimeoutExpired:
             return False
         status, self._process = self._process.returncode, None
-        lines = heard.decode(errors='replace').strip().splitlines()
-        self.said = lines[-1] if lines else ''
+        self.lines = heard.decode(errors='replace').strip().splitlines()
         if status == BAD_INPUT and self.said:
             self.failure = self.said
         elif status:
@@ -142,7 +162,8 @@ class Child:
         """End the child now."""
         if self._process is not None:
             self._process.kill()
-            self._process.communicate()
+            with suppress(subprocess.TimeoutExpired):  # a disk that hangs holds even the dead
+                self._process.communicate(timeout=PATIENCE_S)
             self._process = None
             self.failure = 'was stopped'
 
@@ -246,6 +267,11 @@ class Errand(Generic[Result]):
     def is_done(self) -> bool:
         """Whether there is a result or a failure."""
         return not self._thread.is_alive()
+
+    def wait(self, longest_s: float) -> None:
+        """Wait until it is done, or has taken too long."""
+        if self.has_begun:
+            self._thread.join(longest_s)
 
     def _run(self) -> None:
         try:

@@ -66,3 +66,30 @@ def test_a_viewer_that_listens_and_never_reads_is_nobody(machine):
         log.close()
     assert len(complaints) == 1
     assert 'nobody listens' in complaints[0]
+
+
+def test_what_hangs_while_it_is_opened_holds_nobody_up_and_loses_nothing(monkeypatch):
+    monkeypatch.setattr('rotorsoil_ros.background.OPENING_S', 0.01)
+    complaints, shown, let_go = [], [], threading.Event()
+    viewer = Aside(shown.extend, lambda: None, begin=let_go.wait, complain=complaints.append)
+    viewer(0)
+    viewer.flush()
+    assert complaints == ['the viewer hangs while it is opened: what comes waits for it']
+    let_go.set()
+    viewer.close()
+    assert shown == [0]
+
+
+def test_at_the_limit_of_threads_there_is_no_viewer_and_that_is_told(monkeypatch):
+    complaints = []
+
+    def refuse(thread):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, 'start', refuse)
+    viewer = Aside(pytest.fail, pytest.fail, complain=complaints.append)
+    viewer(0)
+    viewer.flush()
+    viewer.close([1])
+    assert complaints == [
+        "the viewer failed and nothing more is shown: can't start new thread"]

@@ -76,7 +76,7 @@ class Recorder:
             self._fail(error)
 
     def flush(self) -> None:
-        """Put everything onto the disk, or try whether it works again; call it every second."""
+        """Put everything onto the disk, or try whether it works again; call it again and again."""
         try:
             if self._failure or self._bag is None:
                 self._resume()
@@ -198,7 +198,7 @@ def reserve(directory: Path) -> None:
     """Raise OSError unless a directory takes a file of a mebibyte."""
     probe = directory / f'.probe_{os.getpid()}'
     try:
-        with probe.open('wb', buffering=0) as stream:
+        with probe.open('xb', buffering=0) as stream:
             os.posix_fallocate(stream.fileno(), 0, RESERVE)
     finally:
         probe.unlink(missing_ok=True)
@@ -208,6 +208,8 @@ ITEMS_AT_ONCE = 64  # records: more would keep the thread, and the interpreter, 
 LOG_BACKLOG = 2048  # batches that wait for a disk that hangs: 100 MB, or half an hour at 10 Hz
 LOG_PATIENCE_S = 5.0  # at the end
 BEHIND = 'the disk did not keep up'
+LATE = 4  # flushes that the disk has not answered, a few seconds
+HANGS = 'the disk does not answer'
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,23 +231,28 @@ class BagAside:
     told once, and written down as a gap when the disk is back.
     """
 
-    def __init__(self, recorder: Recorder, *, complain: Callable[[str], object]) -> None:
-        self._recorder = recorder
+    def __init__(
+        self, begin: Callable[[], Recorder], *, complain: Callable[[str], object],
+    ) -> None:
+        self._make = begin
+        self._recorder: Recorder | None = None
         self._waiting: list[Item] = []
         self._missed: Missed | None = None
-        self._said = recorder.report(0)
-        self._aside = Aside(self._take, recorder.close, complain=complain, name='the log',
-                            done='logged', backlog=LOG_BACKLOG, patience_s=LOG_PATIENCE_S)
+        self._asked = self._answered = 0  # flushes
+        self._said = Diagnostics('log', 0, Level.ERROR, f'not logging: {HANGS}', {})
+        self._aside = Aside(self._take, self._finish, begin=self._begin, complain=complain,
+                            name='the log', done='logged', backlog=LOG_BACKLOG,
+                            patience_s=LOG_PATIENCE_S)
 
     @property
     def path(self) -> Path | None:
         """Directory of the bag, as soon as the disk takes one."""
-        return self._recorder.path
+        return None if self._recorder is None else self._recorder.path
 
     @property
     def file(self) -> Path | None:
         """The file that is being written."""
-        return self._recorder.file
+        return None if self._recorder is None else self._recorder.file
 
     @property
     def backlog(self) -> int:
@@ -259,7 +266,8 @@ class BagAside:
             self._hand_over()
 
     def flush(self, *, wait_s: float = 0.0) -> None:
-        """Have everything put onto the disk, or tried again; call it every second."""
+        """Have everything put onto the disk, or tried again; call it again and again."""
+        self._asked += 1
         self._waiting.append(None)
         self._hand_over(wait_s)
 
@@ -275,6 +283,9 @@ class BagAside:
         if self._missed is not None:
             return replace(said, level=Level.ERROR, summary=(
                 f'not logging: {BEHIND}, {self._missed.count} messages so far'))
+        if said.level is Level.OK and self._asked - self._answered > LATE:
+            return replace(said, level=Level.WARN, summary=(
+                f'{HANGS}: {self.backlog} batches of messages wait in memory'))
         return said
 
     def _hand_over(self, wait_s: float = 0.0) -> None:
@@ -297,15 +308,27 @@ class BagAside:
             elif item is not None:
                 count += len(item.payloads)
                 until_ns = item.log_time_ns[-1]
+            else:
+                self._asked -= 1
         self._missed = Missed(count, until_ns) if count else None
         self._waiting = list(latched.values())
 
+    def _begin(self) -> None:
+        recorder = self._make()
+        self._said, self._recorder = recorder.report(0), recorder
+
+    def _finish(self) -> None:
+        if self._recorder is not None:
+            self._recorder.close()
+
     def _take(self, batch: list[Item]) -> None:
         recorder = self._recorder
+        assert recorder is not None  # it has begun
         for item in batch:
             if item is None:
                 recorder.flush()
                 self._said = recorder.report(0)
+                self._answered += 1
             elif isinstance(item, Missed):
                 recorder.interrupt(item.count, item.until_ns, BEHIND)
             else:

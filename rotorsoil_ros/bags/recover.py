@@ -1,8 +1,10 @@
 """What can be saved of a log whose writer was killed? Everything up to the break."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, UTC
+import fcntl
 import io
 import logging
 import os
@@ -31,7 +33,7 @@ from rotorsoil_ros.bags.reader import (
     unpacked,
     usual_time,
 )
-from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
 
 Progress = Callable[[int, int], None]
@@ -133,9 +135,14 @@ def _recover_file(broken: Path, partial: Path, out: Path, progress: Progress) ->
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise InputError(f'{broken}: is not an MCAP file')
         try:
-            with partial.open('wb') as target:
+            with partial.open('ab') as target:
+                with suppress(OSError):  # a process whose node was killed may still be at it
+                    fcntl.flock(target, fcntl.LOCK_EX)
+                if out.exists():
+                    raise InputError(f'{out}: exists already, and nothing is ever overwritten')
+                target.truncate(0)
                 saved = _copy(stream, target, progress)
-            os.replace(partial, out)
+                os.replace(partial, out)
         finally:
             partial.unlink(missing_ok=True)
     return saved
@@ -268,10 +275,16 @@ def _stream(content: bytes) -> ReadDataStream:
 
 
 def _save_beside(arguments: Sequence[str]) -> None:
-    """Recover a file of a bag beside itself, and say what was saved."""
-    file = Path(arguments[0])
-    logging.getLogger(__name__).warning(  # to stderr: nobody has set logging up
-        '%s: %s', beside(file), recover(file, beside(file)))
+    """Recover files of bags beside themselves; say for each what was saved, or why nothing."""
+    tell = logging.getLogger(__name__).warning  # to stderr: nobody has set logging up
+    for file in map(Path, arguments):
+        try:
+            tell('%s: %s', beside(file), recover(file, beside(file)))
+        except (RotorSoilError, OSError) as error:
+            if beside(file).exists():
+                tell('%s: by another process', beside(file))
+            else:
+                tell('%s: %s', file, error)
 
 
 if __name__ == '__main__':

@@ -5,8 +5,10 @@ from contextlib import suppress
 import fcntl
 from itertools import chain
 import json
+import os
 from pathlib import Path
 import re
+from typing import BinaryIO
 
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
@@ -15,6 +17,7 @@ from rotorsoil_ros.bags import metadata as bag_metadata
 from rotorsoil_ros.bags.metadata import RECOVERED
 
 MARKER = '.rotorsoil_log'
+MARKER_BYTES = 4096  # and more is none of ours
 OPENING_BYTES = 64  # bytes in which a file says who wrote it
 
 Tell = Callable[[str], object]
@@ -94,9 +97,14 @@ def own_bags(directory: Path, name: str) -> list[Path]:
     return []
 
 
+def at_once(file: Path) -> BinaryIO:
+    """Open what may be anything to read: a pipe to which nobody writes must hold nobody up."""
+    return open(file, 'rb', opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
+
+
 def is_own(file: Path) -> bool:
     """Return whether an MCAP file was written by this package."""
-    with suppress(OSError), file.open('rb') as stream:
+    with suppress(OSError), at_once(file) as stream:
         opening = stream.read(OPENING_BYTES)
         return (opening.startswith(MCAP0_MAGIC) and opening[8:9] == bytes([Opcode.HEADER])
                 and bag_metadata.WRITER.encode() in opening)
@@ -106,7 +114,8 @@ def is_own(file: Path) -> bool:
 def _log_of(bag: Path) -> str:
     """Return of which log a directory is a bag; nothing of what is none, or was renamed."""
     with suppress(OSError, ValueError, TypeError, KeyError):
-        said = json.loads((bag / MARKER).read_text(encoding='utf-8'))
+        with at_once(bag / MARKER) as stream:
+            said = json.loads(stream.read(MARKER_BYTES))
         if not bag.is_symlink() and said['directory'] == bag.name:
             return str(said['log'])
     return ''
@@ -118,7 +127,7 @@ def _is_at_rest(bag: Path) -> bool:
 
 
 def _is_written(file: Path) -> bool:
-    with suppress(OSError), file.open('rb') as stream:
+    with suppress(OSError), at_once(file) as stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:

@@ -165,7 +165,7 @@ class BagWriter:
             self.latched[records.topic] = last_of(records)
 
     def flush(self) -> None:
-        """Put everything onto the disk; call it every second, whatever the traffic."""
+        """Put everything onto the disk; call it again and again, whatever the traffic."""
         self._file.check()
         self._file.flush()
         if self._is_full():

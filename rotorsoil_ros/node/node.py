@@ -39,6 +39,8 @@ from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
 
 PERIOD_S = 1.0
+FLUSH_S = 0.75  # what a kill takes from the log, with what writing takes, is less than a second
+NAMESAKE_TICKS = 30  # a node that was killed stays in the graph for 20 s
 SPIN_S = 0.1  # EventsExecutor dispatches nothing without a timeout; signals wait for it
 SWITCH_S = 5e-4  # that an answer may wait for the thread that writes the log
 EXECUTORS = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
@@ -69,7 +71,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self._diagnostics: LifecyclePublisher | None = None
         self._bench: Bench | None = None
         self._turn, self._topics = 0, set[str]()
-        self._namesakes = 1
+        self._namesake_ticks = 0
         self._held = ExitStack()
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -150,9 +152,10 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
             held.callback(watch.destroy)
             self._watches.append(watch)
         self._hand_out(settings.unknown())
-        timer = self.create_timer(
-            PERIOD_S / len(machines), self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        held.callback(self.destroy_timer, timer)
+        for period_s, act in ((PERIOD_S / len(machines), self._tick), (FLUSH_S, log.flush)):
+            timer = self.create_timer(
+                period_s, act, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            held.callback(self.destroy_timer, timer)
         self._log, self._diagnostics, self._bench = log, diagnostics, bench
         settings.is_locked = True
         where = f', log {log.path}' if log.path else ''
@@ -195,7 +198,6 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
             if self._bench is not None:
                 self._bench.step()
             if self._log is not None:
-                self._log.flush()
                 self._report_log(self._log)
         # In turns: fifty at once would keep the speeds of all waiting.
         self._watches[turn].tick(
@@ -206,11 +208,11 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         """Tell if another node has the same name: both answer on the same topics."""
         own = self.get_name(), self.get_namespace()
         count = self.get_node_names_and_namespaces().count(own)
-        if count > 1 and count != self._namesakes:
+        self._namesake_ticks = self._namesake_ticks + 1 if count > 1 else 0
+        if self._namesake_ticks == NAMESAKE_TICKS:
             self.get_logger().error(
                 f'{count} nodes are called {self.get_fully_qualified_name()}: answers are given '
                 f'more than once; rename one with __node or __ns')
-        self._namesakes = count
 
     def _report_log(self, log: RunLog) -> None:
         """Say on /diagnostics, and so in the log itself, how logging goes."""

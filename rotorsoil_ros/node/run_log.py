@@ -54,30 +54,30 @@ class RunLog:
         self, settings: LogSettings, machines: Mapping[str, Machine], *, tell: Tell,
         complain: Tell,
     ) -> None:
-        self._settings = settings
-        self._complain = complain
         self._bag: BagAside | None = None
         self._recovery: Recovery | None = None
         self._viewer: Aside[Event | Path] | None = None
-        self._alone: Path | None = None  # directory of a recording without a bag
-        self._directory = directory = _directory(settings)
+        self._shown_file: Path | None = None
+        directory = _directory(settings)
         if directory is not None:
             self._recovery = Recovery(directory, tell=tell, complain=complain)
         if directory is not None and settings.mcap:
-            self._bag = BagAside(Recorder(
-                directory, settings.name, split_mib=settings.split_mib, split_s=settings.split_s,
-                budget_mib=settings.budget_mib, tell=tell, complain=complain), complain=complain)
-        else:
-            self._make_alone(complain)
-        self._shown_file = self._bag.file if self._bag is not None else None
-        self._viewer = self._open_viewer(machines)
+            self._bag = BagAside(partial(
+                Recorder, directory, settings.name, split_mib=settings.split_mib,
+                split_s=settings.split_s, budget_mib=settings.budget_mib, tell=tell,
+                complain=complain), complain=complain)
+            self._shown_file = self._bag.file
+        self._records = settings.rerun and directory is not None
+        self._display = display = Display(
+            settings, machines, directory, self._bag.path if self._bag else None, complain)
+        if self._records or settings.rerun_url:
+            self._viewer = Aside(
+                display.take, display.close, begin=display.begin, complain=complain)
 
     @property
     def path(self) -> Path | None:
         """Directory of the log, if there is one."""
-        if self._bag is not None:
-            return self._bag.path
-        return self._alone
+        return self._display.alone if self._bag is None else self._bag.path
 
     @property
     def is_written(self) -> bool:
@@ -87,7 +87,7 @@ class RunLog:
     @property
     def is_shown(self) -> bool:
         """Whether there is a recording or a viewer."""
-        return self._viewer is not None
+        return self._viewer is not None and not self._viewer.has_failed
 
     @property
     def backlog(self) -> int:
@@ -105,16 +105,12 @@ class RunLog:
             self._viewer(event)
 
     def flush(self, *, wait_s: float = 0.0) -> None:
-        """Put everything onto the disk, waiting for room if asked to; called once a second."""
+        """Put everything onto the disk, waiting for room if asked to; called again and again."""
         if self._bag is not None:
             self._bag.flush(wait_s=wait_s)
             self._follow(self._bag.file)
-        elif self._make_alone(lambda text: None) and self._alone and self._viewer:
-            self._viewer.put([self._alone / f'{self._alone.name}.rrd'])
         if self._viewer is not None:
             self._viewer.flush()
-        if self._recovery is not None:
-            self._recovery.step()
 
     def report(self, now_ns: int) -> Diagnostics | None:
         """Tell how logging goes, if anything is logged."""
@@ -132,51 +128,79 @@ class RunLog:
         if viewer is not None:
             viewer.close()
 
-    def _make_alone(self, complain: Tell) -> bool:
-        """Make a directory for a recording without a bag, unless there is one."""
-        if self._directory is None or self._alone is not None:
-            return False
-        try:
-            self._alone = new_directory(self._directory, self._settings.name)
-        except OSError as error:
-            complain(f'log {self._directory / self._settings.name} cannot be begun and is tried '
-                     f'again: {error.strerror}')
-            return False
-        return True
-
     def _follow(self, file: Path | None) -> None:
         """Begin a recording of the viewer beside each new file of the bag."""
-        if not self._settings.rerun or self._viewer is None or file in (None, self._shown_file):
+        if not self._records or self._viewer is None or file in (None, self._shown_file):
             return
         # Before what was collected: the file began when the second before was put onto the disk.
         if file is not None and self._viewer.put([file.with_suffix('.rrd')]):
             self._shown_file = file
 
-    def _open_viewer(self, machines: Mapping[str, Machine]) -> Aside[Event | Path] | None:
-        settings, path = self._settings, self.path
-        recording = path / f'{path.name}.rrd' if path and settings.rerun else None
-        url = settings.rerun_url
+
+class Display:
+    """
+    Records and shows on the thread on which it was opened.
+
+    Parameters
+    ----------
+    settings, machines : LogSettings, mapping
+        What is asked for, and what is shown.
+    directory : Path or None
+        Where logs lie.
+    bag : Path or None
+        Beside which files it records; without a bag it makes a directory of its own.
+
+    """
+
+    def __init__(
+        self, settings: LogSettings, machines: Mapping[str, Machine], directory: Path | None,
+        bag: Path | None, complain: Tell,
+    ) -> None:
+        self.alone: Path | None = None
+        self._settings, self._machines, self._complain = settings, machines, complain
+        self._directory, self._bag = directory, bag
+        self._sink: RerunSink | None = None
+
+    def begin(self) -> None:
+        """Open a recording, a viewer or both."""
+        url = self._settings.rerun_url
         if url and not listens(url):
             self._complain(f'nobody listens at {url}: the run is not shown live')
             url = ''
-        if not url and not (settings.rerun and settings.directory):
+        path = self._bag or self._make_alone(self._complain)
+        if url or self._settings.rerun:
+            recording = path / f'{path.name}.rrd' if path and self._settings.rerun else None
+            self._sink = open_viewer(recording, self._machines, url=url)
+
+    def take(self, batch: list[Event | Path]) -> None:
+        """Show events; at a path go on in a new recording, which is bounded as its bag is."""
+        if self._sink is None:
+            return
+        if self.alone is None and (path := self._make_alone(lambda text: None)):
+            self._sink.begin(path / f'{path.name}.rrd')
+        for item in batch:
+            if isinstance(item, Path):
+                self._sink.begin(item)
+            else:
+                self._sink(item)
+        self._sink.flush()
+
+    def close(self) -> None:
+        """Finish the recording."""
+        if self._sink is not None:
+            self._sink.close()
+
+    def _make_alone(self, complain: Tell) -> Path | None:
+        """Make a directory for a recording without a bag."""
+        settings = self._settings
+        if self._directory is None or settings.mcap or not settings.rerun:
             return None
         try:
-            sink = open_viewer(recording, machines, url=url)
-        except (InputError, OSError, RuntimeError) as error:
-            self._complain(str(error))
-            return None
-        return Aside(partial(_show, sink), sink.close, complain=self._complain)
-
-
-def _show(sink: 'RerunSink', batch: list[Event | Path]) -> None:
-    """Show events; at a path go on in a new recording, which is bounded as its bag is."""
-    for item in batch:
-        if isinstance(item, Path):
-            sink.begin(item)
-        else:
-            sink(item)
-    sink.flush()
+            self.alone = new_directory(self._directory, settings.name)
+        except OSError as error:
+            complain(f'log {self._directory / settings.name} cannot be begun and is tried '
+                     f'again: {error.strerror}')
+        return self.alone
 
 
 def _directory(settings: LogSettings) -> Path | None:

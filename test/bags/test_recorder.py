@@ -12,6 +12,7 @@ import yaml
 from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.recorder import Recorder
 from rotorsoil_ros.bags.retention import MARKER
+from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.events import Level
 
 from records import joint_records, read_all, START, string_records
@@ -198,3 +199,25 @@ def test_errno_is_told_in_words(desk, monkeypatch):
     monkeypatch.setattr(desk.recorder._bag, 'write', fail)
     assert desk.pass_second().summary.startswith('logging again')
     assert 'No space left on device' in desk.complaints[0]
+
+
+def test_a_split_that_may_not_be_made_is_told_and_tried_again(tmp_path, monkeypatch):
+    """As when somebody takes the right to write while the run is on."""
+    desk = Desk(tmp_path, split_s=0.05)
+    opened = []
+
+    def refuse(path):
+        opened.append(path)
+        if len(opened) < 3:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return LogFile(path)
+
+    monkeypatch.setattr('rotorsoil_ros.bags.writer.LogFile', refuse)
+    levels = [desk.pass_second().level for _ in range(5)]
+    desk.recorder.close()
+    assert levels[0] is Level.ERROR
+    assert levels[-1] is Level.OK
+    assert len(desk.complaints) == len(desk.told) == 1
+    assert 'Permission denied' in desk.complaints[0]
+    assert len(gaps(tmp_path / 'run')) == 1
+    assert len(read_all(tmp_path / 'run')) == desk.recorder.report(0).values['written']

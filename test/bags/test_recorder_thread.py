@@ -26,12 +26,17 @@ class Desk:
         self.told, self.complaints = [], []
         self.goes, self.is_held = threading.Event(), threading.Event()
         self.goes.set()
-        self.recorder = Recorder(directory, 'run', split_mib=0.0, split_s=0.0,
-                                 budget_mib=0.0, tell=self.told.append,
-                                 complain=self.complaints.append)
-        self._write = self.recorder._bag._file._stream.write
-        self.recorder._bag._file._writer._stream = self
-        self.aside = BagAside(self.recorder, complain=self.complaints.append)
+        self.directory = directory
+        self.aside = BagAside(self.begin, complain=self.complaints.append)
+        self.recorder = self.aside._recorder
+
+    def begin(self):
+        recorder = Recorder(self.directory, 'run', split_mib=0.0, split_s=0.0,
+                            budget_mib=0.0, tell=self.told.append,
+                            complain=self.complaints.append)
+        self._write = recorder._bag._file._stream.write
+        recorder._bag._file._writer._stream = self
+        return recorder
 
     def write(self, content):
         """Write as a stream does, once the disk goes."""

@@ -8,7 +8,7 @@ from rosbags.highlevel import AnyReader
 import yaml
 
 from rotorsoil_ros.bags.metadata import files as bag_files
-from rotorsoil_ros.bags.retention import make_room, new_directory
+from rotorsoil_ros.bags.retention import make_room, MARKER, new_directory
 from rotorsoil_ros.bags.unfinished import is_unfinished, Recovery, unfinished
 from rotorsoil_ros.bags.writer import BagWriter, LogFile
 
@@ -49,8 +49,8 @@ def refuse(text):
 def recover_all(directory):
     told, complaints = [], []
     recovery = Recovery(directory, tell=told.append, complain=complaints.append)
-    while not recovery.is_done:
-        recovery._children.step(wait_s=600.0)
+    recovery.wait(600.0)
+    assert recovery.is_done
     return told, complaints
 
 
@@ -175,3 +175,16 @@ def test_a_recovered_file_that_the_metadata_does_not_know_is_described(killed, t
     assert recover_all(tmp_path) == ([], [])
     with AnyReader([killed]) as reader:
         assert reader.message_count == 141
+
+
+@pytest.mark.parametrize('place', ['run_1.mcap', 'metadata.yaml', MARKER])
+@pytest.mark.parametrize('make', [
+    os.mkfifo, os.mkdir, lambda path: os.symlink('/dev/zero', path)])
+def test_whatever_lies_in_place_of_a_file_holds_nobody_up(killed, tmp_path, place, make):
+    (killed / place).unlink(missing_ok=True)
+    make(killed / place)
+    told, complaints = recover_all(tmp_path)
+    assert len(told) == (place != 'run_1.mcap')  # what is broken is saved all the same
+    make_room(tmp_path, 'run', budget=0, current=None, keep=None, complain=complaints.append)
+    assert all(str(killed / place) in text for text in complaints)
+    assert (killed / place).is_symlink() or not (killed / place).is_file()

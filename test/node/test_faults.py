@@ -2,7 +2,9 @@
 
 import json
 import math
+import threading
 
+from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
 import pytest
 import rclpy
@@ -17,9 +19,21 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from rotorsoil_ros.bags.metadata import files as bag_files
+from rotorsoil_ros.bags.retention import new_directory
 from rotorsoil_ros.node.node import Survived
 
-from graphs import assert_answers, Bench, exact, joint_state, LATCHED, STAMP, stamp_ns
+from graphs import (
+    assert_answers,
+    Bench,
+    DEADLINE_S,
+    DOMAIN,
+    exact,
+    joint_state,
+    LATCHED,
+    STAMP,
+    stamp_ns,
+)
+from records import topics_of
 
 
 @pytest.fixture
@@ -106,9 +120,7 @@ def test_who_waits_for_a_reload_is_told_when_the_node_is_cleaned_up(bench, case)
 
 
 def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, case, case_file):
-    graph.executor.shutdown()
-    graph.executor = SingleThreadedExecutor(context=graph.context)
-    graph.executor.add_node(graph.probe)
+    graph.use(SingleThreadedExecutor)
     bench = Bench(graph, cache, case_file)
     node = bench.active('fan', fan__case=str(case))
     case.write_text(case.read_text().replace('disc_2', 'wheel'))
@@ -168,8 +180,8 @@ def test_stamps_that_stand_still_or_jump_back_are_answered_and_counted(bench, ma
     counts = node._watches[0].monitor.health.counts
     assert (counts['repeated_stamp'], counts['backward_stamp'], counts['answered']) == (1, 1, 5)
     assert counts['stamp_not_set'] == 1
-    node._tick()
-    node._tick()
+    node._log.flush()
+    node._log.flush()
     node.release()
     assert len(bag_files(tmp_path / 'run')) == 2  # one split, not one each second
 
@@ -212,14 +224,26 @@ def test_nobody_who_is_told_nonsense_gives_another_number(bench, machine):
     assert_answers(amplitude[-1], phase[-1], exact(machine, 300.0))
 
 
-def test_a_namesake_is_noticed_and_told_once(bench, monkeypatch, capfd):
-    node = bench.active('fan')
-    own = node.get_name(), node.get_namespace()
-    monkeypatch.setattr(node, 'get_node_names_and_namespaces', lambda: [own, ('probe', '/'), own])
-    node._look_for_namesakes()
-    assert '2 nodes are called /rotorsoil' in capfd.readouterr().err
-    node._look_for_namesakes()
-    assert '2 nodes' not in capfd.readouterr().err
+def test_a_namesake_is_noticed_and_told_once(bench, capfd, monkeypatch):
+    monkeypatch.setattr('rotorsoil_ros.node.node.NAMESAKE_TICKS', 2)
+    told, hall = [], '/hall'  # where no node of another test has been
+    node = bench.active('fan', cli=['--ros-args', '-r', f'__ns:={hall}'])
+
+    def is_told():
+        told.append(capfd.readouterr().err)
+        return '2 nodes are called /hall/rotorsoil' in ''.join(told)
+
+    other = Context()
+    rclpy.init(context=other, domain_id=DOMAIN)
+    namesake = Node('rotorsoil', namespace=hall, context=other)
+    bench.graph.until(is_told, 'the error')
+    for _ in range(3):
+        node._look_for_namesakes()
+    assert ''.join(told).count(' nodes are called') == 1
+    assert ' nodes are called' not in capfd.readouterr().err
+    namesake.destroy_node()
+    other.shutdown()
+    bench.graph.until(lambda: not node._namesake_ticks, 'the end of the namesake')
 
 
 def test_what_a_callback_raises_is_told_once_and_survived():
@@ -233,3 +257,32 @@ def test_what_a_callback_raises_is_told_once_and_survived():
     for stop in (KeyboardInterrupt, ExternalShutdownException):
         with pytest.raises(stop), survived:
             raise stop
+
+
+def test_a_disk_that_hangs_at_the_start_is_waited_for_aside(bench, tmp_path, monkeypatch):
+    """As a network drive whose server is gone: no error, no answer."""
+    goes = threading.Event()
+
+    def hang(directory, name):
+        assert goes.wait(DEADLINE_S)
+        return new_directory(directory, name)
+
+    monkeypatch.setattr('rotorsoil_ros.background.OPENING_S', 0.01)
+    monkeypatch.setattr('rotorsoil_ros.bags.recorder.new_directory', hang)
+    monkeypatch.setattr('rotorsoil_ros.bags.unfinished.undescribed', lambda directory: range(
+        not goes.wait(DEADLINE_S)))
+    reports = bench.hear('/diagnostics', DiagnosticArray)
+
+    def is_said(what):
+        return any(what in status.message for report in reports for status in report.status)
+
+    node = bench.active('fan', log__directory=str(tmp_path))
+    amplitude, _ = bench.answers()
+    publish = bench.speaker()
+    publish(joint_state([300.0]))
+    bench.graph.until(lambda: amplitude, 'the answer')
+    bench.graph.until(lambda: is_said('not logging: the disk does not answer'), 'the reason')
+    goes.set()
+    bench.graph.until(lambda: is_said('logging to'), 'the log')
+    node.release()
+    assert topics_of(tmp_path / 'run')['/rotorsoil/fan/amplitude'][1] == 1  # nothing is lost
