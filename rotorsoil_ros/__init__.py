@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from rotorsoil_ros.bags.comparison import compare, Wish
     from rotorsoil_ros.bags.profile import read_profile
     from rotorsoil_ros.case.design.report import DesignReport
+    from rotorsoil_ros.bags.tables.exported import export_log
+    from rotorsoil_ros.bags.tables.imported import import_table, ImportedTable
     from rotorsoil_ros.case.machine import load, Machine
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
@@ -59,12 +61,12 @@ __version__ = '0.1.0'
 __all__ = [
     'Bearing', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison',
     'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DesignReport', 'Disc',
-    'Embedment', 'Foundation', 'InfiniteElementModel', 'InputError', 'Layer', 'LayeredSoil',
-    'Machine', 'Matching', 'Material', 'NotSolvedError', 'OutOfTableError', 'Part', 'Pedestal',
-    'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response',
+    'Embedment', 'Foundation', 'ImportedTable', 'InfiniteElementModel', 'InputError', 'Layer',
+    'LayeredSoil', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'OutOfTableError', 'Part',
+    'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response',
     'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil',
     'SoilModel', 'SoilSpread', 'SpeedSource', 'ThinLayerModel', 'Verdict', 'Wish', 'compare',
-    'load', 'read_profile',
+    'export_log', 'import_table', 'load', 'read_profile',
 ]
 
 # Which room a public name lives in.
@@ -72,6 +74,8 @@ _ROOMS = {
     'bags.comparison': ('Wish', 'compare'),
     'bags.profile': ('read_profile',),
     'case.design.report': ('DesignReport',),
+    'bags.tables.exported': ('export_log',),
+    'bags.tables.imported': ('ImportedTable', 'import_table'),
     'case.machine': ('Machine', 'load'),
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),

@@ -1,15 +1,18 @@
 """Messages of a log for the tests, and all that is in one."""
 
+from pathlib import Path
 import struct
 
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.tables.imported import import_table
 from rotorsoil_ros.wire.definitions import FLOAT64, JOINT_STATE, STRING
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
+RUN_UP = Path(__file__).parent / 'reference' / 'measured' / 'rk4_runup_1x.csv'
 START = 1_700_000_000_000_000_001
 
 
@@ -28,6 +31,16 @@ def float_records(count, *, topic='/fan/rotor/speed', start=START):
 def string_records(*, start=START):
     payload = STORE.serialize_cdr(STORE.types[STRING]('{}'), STRING)
     return Records('/rotorsoil/fan/model', STRING, [start], [bytes(payload)], latched=True)
+
+
+def import_run_up(path, machine='rk4_rotor_kit', start_ns=START):
+    """Write the measured run-up of the rotor kit, a row of which is a turn."""
+    return import_table(RUN_UP, {
+        'machine': machine, 'time': {'every': 'turn'}, 'speed': {'column': 'rpm', 'unit': 'rpm'},
+        'channels': {'probe_1_x': {
+            'amplitude': {'column': 'amp_1x_um', 'unit': 'um 0-p'},
+            'phase': {'column': 'phase_1x_deg', 'unit': 'deg', 'sense': 'lead'}}}},
+        path, start_ns=start_ns)
 
 
 def read_all(path, **options):

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.bags.comparison import compare
-from rotorsoil_ros.bags.profile import import_run_up
 from rotorsoil_ros.bags.synthetic import on_ground, Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.config import load
@@ -27,20 +26,21 @@ from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
+from records import import_run_up
+
 ROOT = Path(__file__).parents[1]
 KIT = str(ROOT / 'config' / 'rk4_rotor_kit.yaml')
 FAN = str(ROOT / 'config' / 'plant_fan.yaml')
 START_NS = 1_700_000_000_000_000_000
 SECOND = 1_000_000_000
 HOUSINGS = tuple(f'{end}_housing_{axis}' for end in ('drive_end', 'fan_end') for axis in 'xz')
-RUN_UP = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
 
 
 @pytest.fixture(scope='module')
 def kit_log(tmp_path_factory):
     """Return the measured run-up of the rotor kit as a profile with vectors."""
     path = tmp_path_factory.mktemp('kit') / 'run_up.mcap'
-    import_run_up(RUN_UP, path, machine='rk4_rotor_kit', channel='probe_1_x', start_ns=START_NS)
+    import_run_up(path, start_ns=START_NS)
     return str(path)
 
 

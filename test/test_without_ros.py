@@ -7,12 +7,10 @@ import sys
 
 import pytest
 
-from rotorsoil_ros.bags.profile import import_run_up
-
 from house import ROS
+from records import import_run_up
 
 ROOT = Path(__file__).parents[1]
-RUN_UP = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
 ROTOR_KIT = ROOT / 'config' / 'rk4_rotor_kit.yaml'
 
 
@@ -35,8 +33,7 @@ def without_ros(tmp_path, cache):
 
 
 def test_offline_verbs_need_no_ros(without_ros, tmp_path):
-    import_run_up(RUN_UP, tmp_path / 'profile.mcap', machine='rk4_rotor_kit',
-                  channel='probe_1_x', start_ns=1_700_000_000_000_000_000)
+    import_run_up(tmp_path / 'profile.mcap')
     for arguments in (
             ['check', ROTOR_KIT],
             ['response', ROTOR_KIT, '--rpm', '800:1200:5', '-o', 'response.csv'],

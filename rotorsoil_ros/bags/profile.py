@@ -1,7 +1,6 @@
 """What did the speed of a machine do? Profiles in bags: found, read, written, measured."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-import csv
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,8 +12,7 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.reader import CDR, Source
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import NANOSECONDS, Profile
-from rotorsoil_ros.units import rpm_to_rad_s, SECONDS_PER_MINUTE
+from rotorsoil_ros.events import Profile
 from rotorsoil_ros.wire.cdr import ARRAYS
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import raw_channel, SPEED_TOPICS, TOPICS
@@ -24,7 +22,6 @@ from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USU
 SPEEDS_AT_ONCE = 1024
 MOST_TOLD = 8
 ADVICE = '; another number is read if its topic, field and unit are named (--speed-topic)'
-MICROMETRE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,45 +232,6 @@ def write_speed_profile(
                                     velocity=speed[part]))
 
 
-def import_run_up(
-    source: Path, target: Path, *, machine: str, channel: str, start_ns: int,
-) -> None:
-    """
-    Turn a table of a measured run-up into a profile with measured amplitude and phase.
-
-    Parameters
-    ----------
-    source : Path
-        CSV with the columns rpm, amp_1x_um (zero-to-peak) and phase_1x_deg, one row per
-        revolution, in any order; lines that begin with # are comments.
-    target : Path
-        MCAP file to write.
-    machine, channel : str
-        Whose topics, and where it was measured.
-    start_ns : int
-        When the run-up began [ns].
-
-    Notes
-    -----
-    The speed rises, so the real order is that of the speed, and a row comes one revolution
-    after the row before it.
-
-    """
-    table = _columns(source, ('rpm', 'amp_1x_um', 'phase_1x_deg'))
-    speed_rpm, amplitude_um, phase_deg = table[np.argsort(table[:, 0], kind='stable')].T
-    if not speed_rpm[0] > 0.0:
-        raise InputError(f'{source}: rpm must be > 0, got {speed_rpm[0]:g}')
-    turns_s = np.concatenate([[0.0], SECONDS_PER_MINUTE / speed_rpm[:-1]]).cumsum()
-    stamp_ns = start_ns + np.rint(turns_s * NANOSECONDS).astype(np.int64)
-    with LogFile(target) as log:
-        log.write(_joint_states(f'/{machine}/joint_states', ROTOR_JOINT, stamp_ns,
-                                velocity=rpm_to_rad_s(speed_rpm)))
-        log.write(_joint_states(f'/{machine}/measured/amplitude', channel, stamp_ns,
-                                position=MICROMETRE * amplitude_um))
-        log.write(_joint_states(f'/{machine}/measured/phase', channel, stamp_ns,
-                                position=np.deg2rad(phase_deg)))
-
-
 def _joint_states(topic: str, name: str, stamp_ns: IntArray, **given: FloatArray) -> Records:
     """Return JointStates of one joint, of whose arrays some are given and the others NaN."""
     values = np.full((len(stamp_ns), len(ARRAYS), 1), np.nan)
@@ -281,19 +239,3 @@ def _joint_states(topic: str, name: str, stamp_ns: IntArray, **given: FloatArray
         values[:, ARRAYS.index(array), 0] = value
     stamps = stamp_ns.tolist()
     return Records(topic, JOINT_STATE, stamps, JointStateWriter([name]).write(stamps, values))
-
-
-def _columns(source: Path, names: Sequence[str]) -> FloatArray:
-    """Read named columns of a CSV with comments, (rows, names)."""
-    try:
-        lines = source.read_text(encoding='utf-8').splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f'{source}: cannot be read ({error})') from error
-    rows = list(csv.DictReader(line for line in lines if not line.startswith('#')))
-    try:
-        table = np.array([[float(row[name]) for name in names] for row in rows])
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f'{source}: needs numbers in the columns {", ".join(names)}') from error
-    if not len(table) or not np.all(np.isfinite(table)):
-        raise InputError(f'{source}: needs at least one row, all of it finite')
-    return table

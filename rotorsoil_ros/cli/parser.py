@@ -262,6 +262,31 @@ def _add_modal_verbs(verbs: _Verbs) -> None:
 
 
 def _add_import_verbs(verbs: _Verbs) -> None:
+    table = _verb(verbs, 'import', 'exchange:import_table',
+                  'turn a measured table (CSV, Excel, UFF 58) into a bag with speed and vectors',
+                  case=False)
+    table.add_argument('table', metavar='TABLE', type=Path, help='CSV, .xlsx, or .uff')
+    _add_output(table, 'BAG', 'MCAP file to write, or a new bag directory')
+    table.add_argument('--map', metavar='MAP.yaml', type=Path, help='which column is what')
+    add = table.add_argument_group('instead of a map, for a table with one channel').add_argument
+    for name, says in (
+            ('machine', 'name of the machine'), ('channel', 'where it was measured, as in '
+             'drive_end_housing_x'), ('time', 'column of the time'),
+            ('time-unit', 's, ms, min...'),
+            ('time-format', 'iso, or as in %%d.%%m.%%Y %%H:%%M:%%S'),
+            ('time-every', 'without a column: turn, or seconds between rows'),
+            ('time-start', 'date at which times begin'), ('speed', 'column of the speed'),
+            ('speed-unit', 'rpm, Hz, rad/s or deg/s'), ('amplitude', 'column of the amplitude'),
+            ('amplitude-unit', 'as in um p-p, mm/s rms, mil 0-p'),
+            ('phase', 'column of the phase'), ('phase-unit', 'deg or rad'),
+            ('phase-sense', 'lag or lead')):
+        add(f'--{name}', metavar=name.split('-')[-1].upper(), help=says)
+    export = _verb(verbs, 'export', 'exchange:export',
+                   'write speed, predicted, measured, residual and zone of a log as a long table',
+                   case=False)
+    export.add_argument('log', metavar='LOG', type=Path, help='MCAP file or bag')
+    _add_output(export, 'X.parquet or X.csv', 'table to write')
+    export.add_argument('--machine', metavar='NAME', help='which machine (default: all)')
     ross = _verb(verbs, 'import-ross', 'bags:import_ross',
                  'write the case of a rotor that ROSS saved as TOML or JSON', case=False)
     ross.add_argument('rotor', metavar='ROTOR', type=Path, help='what Rotor.save wrote')

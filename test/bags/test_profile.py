@@ -9,17 +9,12 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
-from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import (
-    import_run_up,
     Place,
     place,
     speed_profile,
     write_speed_profile,
 )
-from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.cdr import joint_states, Layout
 from rotorsoil_ros.wire.definitions import FLOAT64, JOINT_STATE, STRING
 from rotorsoil_ros.wire.speeds import SpeedSource
 
@@ -115,54 +110,3 @@ def test_memory_does_not_grow_with_the_length_of_the_profile(tmp_path):
         found, peaks[count] = peak_memory(path)
         assert found == count
     assert peaks[72_000] < 1.2 * peaks[24_000]
-
-
-TABLE = """# a run-up, sorted the wrong way round
-rpm,amp_1x_um,phase_1x_deg
-1200,2.5,-90
-600,1.0,180
-"""
-
-
-def measured(path, topic):
-    payloads = [payload for source, _, payload in bag_reader.messages(path, lambda *_: True)
-                if source.topic == topic]
-    return joint_states(Layout.of(JOINT_STATE, payloads[0]), payloads)
-
-
-def test_a_run_up_gets_the_time_of_its_revolutions(tmp_path):
-    (tmp_path / 'table.csv').write_text(TABLE)
-    out = tmp_path / 'run_up.mcap'
-    import_run_up(tmp_path / 'table.csv', out, machine='kit', channel='probe_1_x', start_ns=START)
-    stamps, speeds = read(out)
-    assert stamps.tolist() == [START, START + 100_000_000]  # one turn at 600 rpm lasts 0.1 s
-    np.testing.assert_allclose(speeds, [20.0 * math.pi, 40.0 * math.pi], rtol=1e-15)
-    amplitude = measured(out, '/kit/measured/amplitude')
-    assert amplitude.names == ('probe_1_x',)
-    np.testing.assert_allclose(amplitude.position[:, 0], [1.0e-6, 2.5e-6], rtol=1e-15)
-    assert np.isnan(amplitude.velocity).all()
-    phase = measured(out, '/kit/measured/phase')
-    np.testing.assert_allclose(phase.position[:, 0], [math.pi, -0.5 * math.pi], rtol=1e-15)
-    assert phase.stamp_ns.tolist() == stamps.tolist()
-
-
-@pytest.mark.parametrize('table', [
-    '', 'rpm,amp_1x_um\n1,2\n', 'rpm,amp_1x_um,phase_1x_deg\n',
-    'rpm,amp_1x_um,phase_1x_deg\n600,1,nan\n', 'rpm,amp_1x_um,phase_1x_deg\n600,,1\n',
-    'rpm,amp_1x_um,phase_1x_deg\n600,1\n', 'rpm,amp_1x_um,phase_1x_deg\n0,1,1\n'])
-def test_a_table_that_is_not_a_run_up_is_refused(tmp_path, table):
-    (tmp_path / 'table.csv').write_text(table)
-    with pytest.raises(InputError, match=r'table\.csv: '):
-        import_run_up(tmp_path / 'table.csv', tmp_path / 'out.mcap', machine='kit', channel='x',
-                      start_ns=0)
-    assert not (tmp_path / 'out.mcap').exists()
-
-
-def test_the_measured_run_up_ramps_at_228_rpm_per_second(tmp_path):
-    source = REFERENCE / 'measured' / 'rk4_runup_1x.csv'
-    out = tmp_path / 'rk4.mcap'
-    import_run_up(source, out, machine='kit', channel='probe_1_x', start_ns=START)
-    stamps, speeds = read(out)
-    assert len(stamps) == 210
-    ramp = (speeds[-1] - speeds[0]) / ((stamps[-1] - stamps[0]) * 1e-9)
-    assert ramp == pytest.approx(rpm_to_rad_s(228.0), rel=0.05)

@@ -11,13 +11,14 @@ from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.predict import predict
-from rotorsoil_ros.bags.profile import import_run_up, speed_profile
+from rotorsoil_ros.bags.profile import speed_profile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.node.node import RotorsoilNode
 from rotorsoil_ros.node.replay import replay
 
+from records import import_run_up
+
 ROOT = Path(__file__).resolve().parents[2]
-SOURCE = ROOT / 'test' / 'reference' / 'measured' / 'rk4_runup_1x.csv'
 CASE = ROOT / 'config' / 'rk4_rotor_kit.yaml'
 START = 1_700_000_000_000_000_007
 ANSWERS = ('/rotorsoil/rk4_rotor_kit/amplitude', '/rotorsoil/rk4_rotor_kit/phase')
@@ -28,7 +29,7 @@ ROWS = 210
 def run_up(tmp_path):
     """Return the measured run-up as an MCAP."""
     path = tmp_path / 'run_up.mcap'
-    import_run_up(SOURCE, path, machine='rk4_rotor_kit', channel='probe_1_x', start_ns=START)
+    import_run_up(path, start_ns=START)
     return path
 
 
