@@ -29,7 +29,8 @@ FACE = 'rotorsoil_ros'
 OWNERS = {
     **{name: {'node'} for name in ROS}, 'rerun': {'screen'}, 'mcap': {'bags'},
     'matplotlib': {'figures'}, 'pandas': {BASE}, 'xarray': {BASE}, 'pydantic': {'case', 'bags'},
-    'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyarrow': {'bags'}, 'pyuff': {'bags'},
+    'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags'},
+    'pyarrow': {'bags', 'screen'},  # rerun itself needs it
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},
 }
 LONGEST_ROOM, SHORTEST_ROOM = 400, 60
