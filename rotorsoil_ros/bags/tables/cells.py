@@ -25,7 +25,7 @@ TIME_UNITS = {'ns': 1, 'us': 1_000, 'ms': 1_000_000, 's': NANOSECONDS,
               'min': round(SECONDS_PER_MINUTE) * NANOSECONDS, 'h': DAY_NS // 24, 'day': DAY_NS}
 ISO = 'iso'
 
-SIZES = {'p-p': 0.5, '0-p': 1.0, 'rms': math.sqrt(2.0)}  # zero-to-peak of one
+COUNTED_AS = {'p-p': 0.5, '0-p': 1.0, 'rms': math.sqrt(2.0)}  # zero-to-peak of one
 SPELLINGS = {
     **dict.fromkeys(('pp', 'p-p', 'pk-pk', 'pkpk', 'p2p', 'peak-to-peak', 'peak to peak'), 'p-p'),
     **dict.fromkeys(('0p', '0-p', 'pk', 'peak', 'zero-to-peak', 'zero to peak', '0-pk'), '0-p'),
@@ -79,7 +79,7 @@ def amplitude_unit(text: str) -> AmplitudeUnit:
         raise InputError(f'must say p-p (peak-to-peak), 0-p (zero-to-peak) or rms, as in '
                          f'{motion} p-p, got {text!r}')
     derived, factor = MOTIONS[motion]
-    return AmplitudeUnit(derived, factor * SIZES[SPELLINGS.get(size, '0-p')],
+    return AmplitudeUnit(derived, factor * COUNTED_AS[SPELLINGS.get(size, '0-p')],
                          motion.startswith(('rad', 'mrad', 'urad', 'deg')))
 
 

@@ -34,12 +34,12 @@ COLUMNS: dict[str, type] = {
     'predicted_velocity_m_s_rms': float, 'measured_velocity_m_s_rms': float,
     'predicted_zone': str, 'measured_zone': str}
 # From the topics of a node, and of a measuring system, to what they tell.
-TOLD = {'amplitude': 'predicted', 'phase': 'predicted_phase', 'amplitude_low': 'predicted_low',
+TOLD_BY = {'amplitude': 'predicted', 'phase': 'predicted_phase', 'amplitude_low': 'predicted_low',
         'amplitude_high': 'predicted_high', 'residual': 'residual',
         'demodulated/amplitude': 'measured', 'demodulated/phase': 'measured_phase',
         'measured/amplitude': 'measured', 'measured/phase': 'measured_phase'}
 SETTLED_NS = 5 * NANOSECONDS  # after which nothing of a stamp comes any more
-AT_ONCE = 512
+MESSAGES_AT_ONCE = 512
 ROWS_AT_ONCE = 50_000
 
 
@@ -105,7 +105,7 @@ def export_log(
             tables = _Tables(wanted)
             for batch in bag_reader.batches(
                     log, lambda topic, kind: topic in wanted or kind == DIAGNOSTICS,
-                    at_most=AT_ONCE, span_ns=NANOSECONDS):
+                    at_most=MESSAGES_AT_ONCE, span_ns=NANOSECONDS):
                 rows += tables.take(batch)
                 done += len(batch.payloads)
                 if progress:
@@ -127,12 +127,12 @@ def _told(topic: str, message_type: str) -> tuple[str, str] | None:
     if (found := place(topic, message_type)) is not None:
         if found.name in SPEED_TOPICS:
             return found.machine, ''
-        return (found.machine, TOLD[found.name]) if found.name in TOLD else None
+        return (found.machine, TOLD_BY[found.name]) if found.name in TOLD_BY else None
     if message_type != JOINT_STATE:
         return None
     name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len, default='')
     machine = topic.removesuffix(f'/{name}').rpartition('/')[2]
-    return (machine, TOLD[name]) if name in TOLD else None
+    return (machine, TOLD_BY[name]) if name in TOLD_BY else None
 
 
 @dataclass

@@ -35,7 +35,7 @@ from rotorsoil_ros.wire.speeds import ROTOR_JOINT
 
 STEADY_NS = 10 * NANOSECONDS  # between rows of which nobody says when they were measured
 MOST_FAULTS = 40
-AT_ONCE = 4096
+ROWS_WRITTEN = 4096
 
 
 @dataclass(frozen=True)
@@ -386,7 +386,7 @@ def _write(out: Path, records: list[Records]) -> None:
 def _slices(records: list[Records]) -> Iterator[Records]:
     """Yield messages some at a time, so that topics come side by side, as they were measured."""
     longest = max((len(each.payloads) for each in records), default=0)
-    for start in range(0, longest, AT_ONCE):
-        part = slice(start, start + AT_ONCE)
+    for start in range(0, longest, ROWS_WRITTEN):
+        part = slice(start, start + ROWS_WRITTEN)
         yield from (each._replace(log_time_ns=each.log_time_ns[part],
                                   payloads=each.payloads[part]) for each in records)

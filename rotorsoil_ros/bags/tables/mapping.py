@@ -26,7 +26,7 @@ Column: TypeAlias = str | int
 # Where a fault is told to be, given the keys that lead to it.
 Spell: TypeAlias = Callable[[tuple[int | str, ...]], str]
 
-MACHINE = re.compile(r'[A-Za-z][A-Za-z0-9_]*')
+PLAIN_NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]*')
 EXAMPLE = """machine: fan
 time: {column: Time, unit: s}          # or format: "%d.%m.%Y %H:%M:%S"; or every: turn
 speed: {column: Speed, unit: rpm}
@@ -53,7 +53,7 @@ def _one_of(known: Container[str], rule: str) -> AfterValidator:
 
 
 def _name(text: str) -> str:
-    if not MACHINE.fullmatch(text):
+    if not PLAIN_NAME.fullmatch(text):
         raise InputError(f'must be a name of letters, digits and _, got {text!r}')
     return text
 
