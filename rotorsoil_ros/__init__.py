@@ -25,9 +25,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rotorsoil_ros.bags.comparison import compare, Wish
     from rotorsoil_ros.bags.profile import read_profile
-    from rotorsoil_ros.case.design.report import DesignReport
     from rotorsoil_ros.bags.tables.exported import export_log
     from rotorsoil_ros.bags.tables.imported import import_table, ImportedTable
+    from rotorsoil_ros.case.design.report import DesignReport
     from rotorsoil_ros.case.machine import load, Machine
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
