@@ -231,8 +231,10 @@ def _look(
 ) -> tuple[BoolArray, BoolArray, ComplexArray]:
     """Return which pieces need no halving, which of them are right, and their values."""
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
+    # A table of a bearing may end where the first piece begins, to the last bit.
+    speed = np.clip(middle[:, None] + half[:, None] * along, left[:, None], right[:, None])
     wanted, probing = (values.reshape(len(left), len(along), *values.shape[1:])
-                       for values in solve((middle[:, None] + half[:, None] * along).ravel()))
+                       for values in solve(speed.ravel()))
     good = _matches(wanted, between, groups, tolerance)
     short = right - left <= _SHORTEST * high
     clear = (_matches(probing, between, groups, _PROBE_TOLERANCE)
