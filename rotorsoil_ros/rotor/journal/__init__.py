@@ -1,0 +1,1 @@
+"""Journal bearings from their geometry: the oil film, its coefficients and its loads."""
