@@ -142,6 +142,13 @@ class Bearing:
         """Mean direct stiffness over its directions and speeds [N/m]."""
         return float(np.abs(np.diagonal(_values(self.stiffness), axis1=-2, axis2=-1)).mean())
 
+    @property
+    def is_film(self) -> bool:
+        """Whether it pushes across as fluid films do: cross terms that differ, over the speed."""
+        own = self.stiffness
+        return isinstance(own, SpeedTable) and bool(
+            np.any(own.values[:, 0, 1] != own.values[:, 1, 0]))
+
     def scaled(self, *, stiffness: float = 1.0, damping: float = 1.0) -> 'Bearing':
         """Return the same bearing with its stiffness and its damping times a factor each."""
         return replace(self, stiffness=_times(stiffness, self.stiffness),

@@ -12,7 +12,8 @@ from scipy.optimize import linear_sum_assignment
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, solved
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes.feeding import fastest, Feed, feeds, highest_fed, knots
+from rotorsoil_ros.machine.modes import feeding
+from rotorsoil_ros.machine.modes.feeding import CAUSES, Feed, feeds, knots
 from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 from rotorsoil_ros.units import rad_s_to_rpm
@@ -168,11 +169,11 @@ def stability(model: CoupledModel, span: tuple[float, float]) -> Stability:
 
     """
     low, high = model.within_tables(span)
-    bound = highest_fed(model, (low, high))
+    bound = feeding.highest_fed(model, (low, high))
     if bound == 0.0:
         return Stability((low, high), (), 0.0)
     # Nothing vibrates faster than the mesh: a damper that takes nothing sets no other bound.
-    wanted = min(_ABOVE * bound, fastest(model))
+    wanted = min(_ABOVE * bound, feeding.fastest(model))
     with solved('stability of this machine'):
         pencil = Pencil.up_to(model, wanted)
         samples = _followed(pencil, _first(model, (low, high)))
@@ -348,8 +349,18 @@ class _Growth:
         moving = np.abs(rotor) ** 2 * np.tile(pencil.solver.basis.mass, 2)
         forward, backward = moving.reshape(2, -1).sum(axis=1)
         whirl = 0 if abs(w.real) < _CREEPING * abs(w) else 1 if forward >= backward else -1
-        yield Instability(_name(pencil, found, mode), self.low, high, found.speed, abs(w.real),
+        name = _name(pencil, found, mode)
+        if whirl > 0 and _is_fed_by_films(pencil, given):
+            name = f'fluid-film whirl, {name}'
+        yield Instability(name, self.low, high, found.speed, abs(w.real),
                           _damping(found, mode), whirl, given)
+
+
+def _is_fed_by_films(pencil: Pencil, given: tuple[Feed, ...]) -> bool:
+    """Return whether most of what is given comes from the cross-coupling of fluid films."""
+    films = {bearing.name for bearing in pencil.model.rotor.bearings if bearing.is_film}
+    return sum(feed.share for feed in given
+               if feed.name in films and feed.cause == CAUSES[0]) > 0.5
 
 
 def _name(pencil: Pencil, found: Vibrations, mode: int) -> str:
