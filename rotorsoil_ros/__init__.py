@@ -54,6 +54,9 @@ if TYPE_CHECKING:
     from rotorsoil_ros.rotor.assembly import Rotor
     from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
     from rotorsoil_ros.rotor.disc import Disc
+    from rotorsoil_ros.rotor.journal.geometry import JournalBearing
+    from rotorsoil_ros.rotor.journal.oil import Oil, Viscosity
+    from rotorsoil_ros.rotor.journal.states import JournalStates
     from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
     from rotorsoil_ros.wire.speeds import SpeedSource
 
@@ -61,12 +64,13 @@ __version__ = '0.1.0'
 __all__ = [
     'Bearing', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison',
     'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DesignReport', 'Disc',
-    'Embedment', 'Foundation', 'ImportedTable', 'InfiniteElementModel', 'InputError', 'Layer',
-    'LayeredSoil', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'OutOfTableError', 'Part',
-    'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response',
-    'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil',
-    'SoilModel', 'SoilSpread', 'SpeedSource', 'ThinLayerModel', 'Verdict', 'Wish', 'compare',
-    'export_log', 'import_table', 'load', 'read_profile',
+    'Embedment', 'Foundation', 'ImportedTable', 'InfiniteElementModel', 'InputError',
+    'JournalBearing', 'JournalStates', 'Layer', 'LayeredSoil', 'Machine', 'Matching', 'Material',
+    'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction',
+    'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil',
+    'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel', 'SoilSpread',
+    'SpeedSource', 'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
+    'import_table', 'load', 'read_profile',
 ]
 
 # Which room a public name lives in.
@@ -102,6 +106,9 @@ _ROOMS = {
     'rotor.assembly': ('Rotor',),
     'rotor.bearing': ('Bearing', 'Pedestal'),
     'rotor.disc': ('Disc',),
+    'rotor.journal.geometry': ('JournalBearing',),
+    'rotor.journal.oil': ('Oil', 'Viscosity'),
+    'rotor.journal.states': ('JournalStates',),
     'rotor.shaft': ('Material', 'Probe', 'ShaftSection'),
     'wire.speeds': ('SpeedSource',),
 }

@@ -95,8 +95,8 @@ def compare(
     if isinstance(case, Machine):
         cache_directory, case = cache_directory or case.directory, case.case
     elif isinstance(case, (Path, str)):
-        case = config.load(Path(case))
-    case = case or _logged_case(log, descriptions)
+        case = config.load(Path(case), cache_directory=cache_directory)
+    case = case or _logged_case(log, descriptions, cache_directory)
     if wish.soil_factor is not None:
         case = replace(case, uncertainty=replace(
             case.uncertainty, shear_modulus_factor=wish.soil_factor))
@@ -193,11 +193,13 @@ class _Reading:
         return self.expectation.vector(planes)
 
 
-def _logged_case(log: Path, descriptions: Descriptions) -> Case:
+def _logged_case(
+    log: Path, descriptions: Descriptions, cache_directory: Path | None,
+) -> Case:
     """Return the case that a log carries: the last, where it was reloaded."""
     for _, description in reversed(descriptions):
         content, files = description.get('document'), description.get('files', {})
         if isinstance(content, dict) and isinstance(files, dict):
-            return config.case_of(log, content, files={
+            return config.case_of(log, content, cache_directory=cache_directory, files={
                 str(name): str(text) for name, text in files.items()})
     raise InputError(f'{log}: does not carry the case it was answered with; give the CASE')

@@ -10,7 +10,8 @@ from typing import TypeVar
 
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.case.schema import Place
+from rotorsoil_ros.case.entries.bearing import BearingEntry
+from rotorsoil_ros.case.entries.entry import Entry, Place
 from rotorsoil_ros.errors import InputError, RotorSoilError
 
 T = TypeVar('T')
@@ -68,7 +69,7 @@ class Faults:
             raise InputError('\n'.join(dict.fromkeys(self.found)))
 
     @contextmanager
-    def at(self, *place: int | str, entry: schema.Entry | None = None) -> Iterator[None]:
+    def at(self, *place: int | str, entry: Entry | None = None) -> Iterator[None]:
         """Turn a refusal of the physics into an error at a key of the file."""
         try:
             yield
@@ -102,7 +103,7 @@ class Faults:
     def _stations(self) -> list[tuple[Place, str]]:
         rotor = self.entries.rotor
         groups: list[tuple[Place, Sequence[
-            schema.FoundationEntry | schema.DiscEntry | schema.BearingEntry
+            schema.FoundationEntry | schema.DiscEntry | BearingEntry
             | schema.ProbeEntry]]] = [
             (('foundations',), self.entries.foundations), (('rotor', 'discs'), rotor.discs),
             (('rotor', 'bearings'), rotor.bearings), (('rotor', 'probes'), rotor.probes)]

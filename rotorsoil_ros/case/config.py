@@ -11,9 +11,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from rotorsoil_ros.arrays import ComplexArray
-from rotorsoil_ros.case import document, schema, stiffness_file
+from rotorsoil_ros.case import cache, document, schema, stiffness_file
 from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, message
+from rotorsoil_ros.case.entries.entry import faults
+from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
 from rotorsoil_ros.errors import InputError, require, RotorSoilError
@@ -63,6 +65,10 @@ class Case:
         Of housing velocity.
     anti_alias : bool
         Whether a filter before each sensor's converter lets nothing above half its rate pass.
+    journals : tuple of Journal
+        Those of its bearings that are given by their geometry.
+    cache_directory : Path or None
+        Where the tables of their films lie; None is the usual one.
     content : mapping
         The document that it was built from, settings on top included.
     files : mapping of str to str
@@ -83,6 +89,8 @@ class Case:
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
     anti_alias: bool = False
+    journals: tuple[Journal, ...] = field(default=(), compare=False)
+    cache_directory: Path | None = field(default=None, compare=False, repr=False)
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
@@ -90,7 +98,8 @@ class Case:
         """Return this case with settings on top, as `load` takes them."""
         content = deepcopy(dict(self.content))
         document.override(content, overrides)
-        return case_of(self.path, content, files=self.files)
+        return case_of(self.path, content, files=self.files,
+                       cache_directory=self.cache_directory)
 
 
 # What a machine may take: nodes of its mesh, and its response table.
@@ -122,7 +131,9 @@ def infinite_range(
     return lowest, high
 
 
-def load(path: Path, overrides: Sequence[str] = ()) -> Case:
+def load(
+    path: Path, overrides: Sequence[str] = (), *, cache_directory: Path | None = None,
+) -> Case:
     """
     Read and check a case file.
 
@@ -132,6 +143,8 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Case:
         The YAML file.
     overrides : sequence of str
         Settings `key.path=value` that replace or add to what the file says, in order.
+    cache_directory : Path or None
+        Where the tables of oil films lie; None is the usual one.
 
     Returns
     -------
@@ -146,11 +159,12 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Case:
     """
     content = document.read(path)
     document.override(content, overrides)
-    return case_of(path, content)
+    return case_of(path, content, cache_directory=cache_directory)
 
 
 def case_of(
     path: Path, content: dict[str, Any], *, files: Mapping[str, str] | None = None,
+    cache_directory: Path | None = None,
 ) -> Case:
     """
     Return the machine of a document, as `load`.
@@ -163,14 +177,16 @@ def case_of(
         The document.
     files : mapping of str to str
         What such files say, where that came with the document.
+    cache_directory : Path or None
+        As `load`.
 
     """
     try:
         entries = schema.Document.model_validate(content)
     except ValidationError as error:
         raise InputError('\n'.join(
-            message(path, place, problem) for place, problem in schema.faults(error))) from error
-    return _Builder(Faults(path, entries), content, dict(files or {})).case()
+            message(path, place, problem) for place, problem in faults(error))) from error
+    return _Builder(Faults(path, entries), content, dict(files or {}), cache_directory).case()
 
 
 @dataclass(frozen=True)
@@ -180,6 +196,7 @@ class _Builder:
     faults: Faults
     content: Mapping[str, Any]
     files: dict[str, str]
+    cache_directory: Path | None
 
     def case(self) -> Case:
         """Return the machine, or raise one InputError with all that is wrong with it."""
@@ -197,6 +214,9 @@ class _Builder:
         unbalance = unbalances.total()
         tables = None if speed_range is None else faults.attempt(
             lambda: self._tables(speed_range))
+        journals = None
+        if rotor is not None and speed_range is not None:
+            journals = self._journals().journals(rotor, speed_range)
         uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
         faults.tell()
         assert rotor is not None
@@ -204,19 +224,25 @@ class _Builder:
         assert unbalance is not None
         assert speed_range is not None
         assert tables is not None
+        assert journals is not None
         assert uncertainty is not None
         assert zones is not None
         case = Case(
             name=entries.name, path=faults.path, soil=soil, support=entries.support,
-            foundations=foundations, rotor=rotor, unbalance=unbalance,
+            foundations=foundations, rotor=floated(rotor, journals), unbalance=unbalance,
             couples=unbalances.couples(), speed_range=speed_range, tables=tables,
             uncertainty=uncertainty, zones=zones, anti_alias=self.faults.entries.anti_alias,
+            journals=journals, cache_directory=self.cache_directory,
             content=self.content, files=self.files)
         with faults.at('rotor', entry=entries.rotor):
             self._refuse_size(CoupledModel(
-                rotor, case.foundations, [RigidSoil() for _ in case.foundations], case.couples))
+                case.rotor, case.foundations, [RigidSoil() for _ in case.foundations],
+                case.couples))
         self._refuse_unreachable_soil(case)
         return case
+
+    def _journals(self) -> JournalEntries:
+        return JournalEntries(self.faults, cache.directory(self.cache_directory))
 
     def _mesh(self) -> int:
         """Return the number of nodes, or raise an InputError if nobody could solve so many."""

@@ -27,7 +27,8 @@ def load_all(
     Soils of one kind share a table, so that one case of each kind goes first. Several tables
     are computed by as many processes as there are cores.
     """
-    cases = {file: config.load(file) for file in dict.fromkeys(files)}
+    cases = {file: config.load(file, cache_directory=cache_directory)
+             for file in dict.fromkeys(files)}
     directory = cache.directory(cache_directory)
     kinds: dict[str, Path] = {}
     for file, case in cases.items():

@@ -12,6 +12,7 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, config, document, models
+from rotorsoil_ros.case.journal_entries import bearing_states, BearingStates
 from rotorsoil_ros.case.summary import band_contents, stability_doubts, undecided, unstable
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.events import Profile
@@ -67,7 +68,8 @@ class Machine:
         overrides: Sequence[str] = (),
     ) -> 'Machine':
         """Read a case; settings `key.path=value` replace or add to what the file says."""
-        return cls(config.load(case_file, overrides), cache.directory(cache_directory))
+        case = config.load(case_file, overrides, cache_directory=cache_directory)
+        return cls(case, cache.directory(cache_directory))
 
     @cached_property
     def model(self) -> CoupledModel:
@@ -106,6 +108,26 @@ class Machine:
         found = Response.of(self.model.channels,
                             self.model.unbalance_response(speed, self.case.unbalance))
         return found.where(self._growth(speed).holds(speed))
+
+    def bearings(self, *, rpm: Numbers) -> tuple[BearingStates, ...]:
+        """
+        Return what every bearing is to the rotor, and where each journal floats in its film.
+
+        Parameters
+        ----------
+        rpm : float or (n,) floats
+            Rotor speeds [rpm].
+
+        Raises
+        ------
+        OutOfTableError
+            If a speed is beyond a table of the case.
+        RotorSoilError
+            If a film carries its load at no place, or is too thin to be known.
+
+        """
+        return bearing_states(self.case.rotor, self.case.journals,
+                              rpm_to_rad_s(_numbers('rpm', rpm)))
 
     def frf(self, *, force: str, hz: Numbers, rpm: float = 0.0) -> Response:
         """
@@ -382,7 +404,8 @@ def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: 
     path = Path(case)
     content = document.read(path)
     document.replace_keys(content, overrides)
-    return Machine(config.case_of(path, content), cache.directory(cache_directory))
+    return Machine(config.case_of(path, content, cache_directory=cache_directory),
+                   cache.directory(cache_directory))
 
 
 def _numbers(name: str, given: Numbers) -> FloatArray:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
 from rotorsoil_ros.rotor.bearing import SpeedTable
 from rotorsoil_ros.rotor.shaft import Material
@@ -17,6 +18,8 @@ _MATERIAL_DENSITY = 1000.0, 20000.0, 'kg/m^3', (1e3,)
 _YOUNG_MODULUS = 1e9, 1e12, 'Pa', (1e9, 1e6)
 _DIAMETER = 5e-4, 3.0, 'm', (1e-3,)
 _STIFFNESS = 1e4, 1e13, 'N/m', (1e6, 1e3)
+_CLEARANCE = 2e-4, 6e-3, 'of the radius', ()
+_VISCOSITY = 2e-4, 2.0, 'Pa s', (1e-3,)
 
 # Of a block: its mass over that of the rotor, its density, its inertia over that of a plate.
 _LEAST_MASS_RATIO = 0.1
@@ -89,13 +92,25 @@ def _of_shaft(case: Case) -> Iterator[str]:
 
 
 def _of_bearings(case: Case) -> Iterator[str]:
+    films = {journal.name: journal for journal in case.journals}
     for index, bearing in enumerate(case.rotor.bearings):
+        if bearing.name in films:
+            yield from _of_film(f'rotor.bearings.{index}.journal', films[bearing.name])
+            continue
         given = bearing.stiffness
         values = given.values.max(axis=0) if isinstance(given, SpeedTable) else given
         for axis, value in zip(('xx', 'zz'), np.diagonal(values).tolist(), strict=True):
             # None at all is a damper or a seal.
             if value > 0.0:
                 yield from asked(f'rotor.bearings.{index}.stiffness.{axis}', value, _STIFFNESS)
+
+
+def _of_film(place: str, journal: Journal) -> Iterator[str]:
+    bore, thick = journal.states.bearing, journal.viscosity.values
+    yield from asked(f'{place}.radial_clearance', bore.radial_clearance / bore.radius,
+                      _CLEARANCE)
+    if journal.oil is None:
+        yield from asked(f'{place}.viscosity', float(thick.max()), _VISCOSITY)
 
 
 def _of_block(case: Case, place: str, block: Foundation) -> Iterator[str]:

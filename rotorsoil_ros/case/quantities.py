@@ -24,6 +24,7 @@ _NAME = re.compile(r'[a-z][a-z0-9_]{0,63}')
 _WITH_UNIT = re.compile(
     r'([-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?:[eE][-+]?[0-9]{1,3})?)\s*'
     r'((?:[A-Za-zµμ°%Ω]+(?:\^[-+]?[0-9])?[ */·]{0,2}){1,6})')
+_OIL = re.compile(r'(?:(?:ISO ?)?VG ?)?([0-9]{1,4})', re.IGNORECASE)
 _GRADE = re.compile(r'[Gg] ?([0-9]{1,5}(?:\.[0-9]{1,5})?)')
 
 
@@ -68,7 +69,8 @@ def _converted(number: float, given: str, unit: str, rule: str) -> float:
 def _registry() -> 'pint.UnitRegistry[float]':
     import pint
 
-    registry: pint.UnitRegistry[float] = pint.UnitRegistry(cache_folder=None)
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry(
+        cache_folder=None, on_redefinition='ignore')
     # Here only turns come per second: 16.5 Hz of a rotor are 990 rpm.
     registry.define('hertz = turn / second = Hz')
     return registry
@@ -101,6 +103,14 @@ def _grade(value: object) -> float:
     return 1e-3 * float(found[1])
 
 
+def _oil_grade(value: object) -> int:
+    """Return the number of an ISO viscosity grade."""
+    found = _OIL.fullmatch(str(value).strip()) if isinstance(value, (str, int)) else None
+    if found is None or isinstance(value, bool):
+        raise ValueError(f'must be an ISO viscosity grade, as in 46 or VG46, got {shown(value)}')
+    return int(found[1])
+
+
 def _file(value: object) -> str:
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise ValueError(f'must be the path of a file, got {shown(value)}')
@@ -122,6 +132,11 @@ KilogramPerCubicMetre = Annotated[float, _number_in('kg/m^3')]
 Pascal = Annotated[float, _number_in('Pa')]
 NewtonPerMetre = Annotated[float, _number_in('N/m')]
 NewtonSecondPerMetre = Annotated[float, _number_in('N s/m')]
+Newton = Annotated[float, _number_in('N')]
+PascalSecond = Annotated[float, _number_in('Pa s')]
+Degree = Annotated[float, _number_in('deg')]
+Celsius = Annotated[float, _number_in('degC')]
 Radian = Annotated[float, _number_in('rad')]
 Rpm = Annotated[float, _number_in('rpm')]
 BalanceGrade = Annotated[float, BeforeValidator(_grade)]
+OilGrade = Annotated[int, BeforeValidator(_oil_grade)]

@@ -11,7 +11,16 @@ from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.case.schema import Place
+from rotorsoil_ros.case.entries.bearing import (
+    BearingEntry,
+    Damping,
+    DampingTable,
+    MassPerAxis,
+    PedestalEntry,
+    Stiffness,
+    StiffnessTable,
+)
+from rotorsoil_ros.case.entries.entry import Place
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing, Pedestal, SpeedTable
@@ -90,11 +99,10 @@ class RotorEntries:
                 return Disc.cylinder(entry.name, entry.position, **values)
             return Disc(entry.name, entry.position, **values)
 
-    def _bearing(self, index: int, entry: schema.BearingEntry) -> Bearing:
+    def _bearing(self, index: int, entry: BearingEntry) -> Bearing:
         place = ('rotor', 'bearings', index)
         foundation = self._foundation_of(place, entry)
-        stiffness = self._matrix((*place, 'stiffness'), entry.stiffness)
-        damping = self._matrix((*place, 'damping'), entry.damping)
+        stiffness, damping = self._coefficients(place, entry)
         pedestal = None
         if entry.pedestal is not None:
             pedestal = self._pedestal((*place, 'pedestal'), entry.pedestal)
@@ -102,7 +110,27 @@ class RotorEntries:
             return Bearing(name=entry.name, position=entry.position, foundation=foundation,
                            stiffness=stiffness, damping=damping, pedestal=pedestal)
 
-    def _foundation_of(self, place: Place, entry: schema.BearingEntry) -> str | None:
+    def _coefficients(
+        self, place: Place, entry: BearingEntry,
+    ) -> tuple[FloatArray | SpeedTable, FloatArray | SpeedTable]:
+        given = {key: value for key, value in (('stiffness', entry.stiffness),
+                                               ('damping', entry.damping)) if value is not None}
+        if entry.journal is not None:
+            if given:
+                raise self.faults.error(*place, problem='needs either journal or stiffness and '
+                                                        f'damping, got journal and {min(given)}')
+            # What a film is follows from what it carries, and that from the rotor.
+            return np.eye(2), np.zeros((2, 2))
+        if entry.load is not None:
+            raise self.faults.error(*place, 'load', problem='belongs to a journal, which is '
+                                                            'missing')
+        if entry.stiffness is None or entry.damping is None:
+            missing = 'stiffness' if entry.stiffness is None else 'damping'
+            raise self.faults.error(*place, missing, problem='is missing')
+        return (self._matrix((*place, 'stiffness'), entry.stiffness),
+                self._matrix((*place, 'damping'), entry.damping))
+
+    def _foundation_of(self, place: Place, entry: BearingEntry) -> str | None:
         blocks = self.faults.entries.foundations
         if entry.foundation is not None or not blocks:
             return entry.foundation
@@ -114,9 +142,9 @@ class RotorEntries:
 
     def _matrix(
         self, place: Place,
-        entry: schema.Stiffness | schema.Damping | schema.StiffnessTable | schema.DampingTable,
+        entry: Stiffness | Damping | StiffnessTable | DampingTable,
     ) -> FloatArray | SpeedTable:
-        if not isinstance(entry, (schema.StiffnessTable, schema.DampingTable)):
+        if not isinstance(entry, (StiffnessTable, DampingTable)):
             return _constant(entry)
         count = len(entry.speed_rpm)
         values = np.zeros((count, 2, 2))
@@ -127,24 +155,12 @@ class RotorEntries:
                     *place, key, problem=f'must have as many entries as speed_rpm, {count}, '
                                          f'got {len(column)}')
             values[:, i, j] = 0.0 if column is None else column
-        self._require_speeds((*place, 'speed_rpm'), entry.speed_rpm)
+        require_speeds(self.faults, (*place, 'speed_rpm'), entry.speed_rpm)
         return SpeedTable(rpm_to_rad_s(np.array(entry.speed_rpm)), values)
 
-    def _require_speeds(self, place: Place, speed_rpm: list[float]) -> None:
-        """Refuse speeds that do not rise, or leave a part of the speed range unknown."""
-        rises = all(left < right for left, right in pairwise(speed_rpm))
-        if not (len(speed_rpm) >= 2 and rises and speed_rpm[0] >= 0.0):
-            raise self.faults.error(*place, problem='must be two or more rising speeds >= 0 rpm, '
-                                                    f'got {shown(speed_rpm)}')
-        low, high = self.faults.entries.speed_range_rpm
-        if low < high and not (speed_rpm[0] <= low and high <= speed_rpm[-1]):
-            raise self.faults.error(
-                *place, problem=f'must cover speed_range_rpm, {low:g} to {high:g} rpm, '
-                                f'got {speed_rpm[0]:g} to {speed_rpm[-1]:g}')
-
-    def _pedestal(self, place: Place, entry: schema.PedestalEntry) -> Pedestal:
+    def _pedestal(self, place: Place, entry: PedestalEntry) -> Pedestal:
         mass = entry.mass
-        masses = (mass.xx, mass.zz) if isinstance(mass, schema.MassPerAxis) else (mass, mass)
+        masses = (mass.xx, mass.zz) if isinstance(mass, MassPerAxis) else (mass, mass)
         with self.faults.at(*place, entry=entry):
             for value in masses:
                 require(0.0 <= value < math.inf, 'mass', '>= 0 kg and finite', value)
@@ -152,11 +168,24 @@ class RotorEntries:
                             damping=_constant(entry.damping))
 
 
+def require_speeds(faults: Faults, place: Place, speed_rpm: list[float]) -> None:
+    """Refuse speeds that do not rise, or leave a part of the speed range unknown."""
+    rises = all(left < right for left, right in pairwise(speed_rpm))
+    if not (len(speed_rpm) >= 2 and rises and speed_rpm[0] >= 0.0):
+        raise faults.error(*place, problem='must be two or more rising speeds >= 0 rpm, '
+                                                f'got {shown(speed_rpm)}')
+    low, high = faults.entries.speed_range_rpm
+    if low < high and not (speed_rpm[0] <= low and high <= speed_rpm[-1]):
+        raise faults.error(
+            *place, problem=f'must cover speed_range_rpm, {low:g} to {high:g} rpm, '
+                            f'got {speed_rpm[0]:g} to {speed_rpm[-1]:g}')
+
+
 def _ends(left: float, right: float | None) -> tuple[float, float]:
     return left, left if right is None else right
 
 
-def _constant(entry: schema.Stiffness | schema.Damping) -> FloatArray:
+def _constant(entry: Stiffness | Damping) -> FloatArray:
     return np.array([[entry.xx, entry.xz], [entry.zx, entry.zz]])
 
 

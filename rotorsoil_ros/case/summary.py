@@ -1,6 +1,7 @@
 """What can be said of a case before anything runs: derived quantities, and what looks odd."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import INPUTS
+from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
@@ -23,7 +25,7 @@ from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilMod
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.rotor.bearing import SpeedTable
-from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
+from rotorsoil_ros.units import GRAVITY, rad_s_to_hz, rad_s_to_rpm
 
 # Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
 # quarter.
@@ -35,6 +37,13 @@ _LARGEST_POISSON_RATIO = 0.45
 
 # Told together, as G, nu and eta of the soil.
 _SOIL = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor')
+
+# A film: load over length times diameter [Pa], Reynolds numbers above which it has vortices (times
+# the root of radius over clearance) and is turbulent, eccentricity below which it is about to
+# whirl, and the share of a threshold up to which machines run.
+_HEAVIEST = 2.5e6
+_VORTICES, _TURBULENT = 41.0, 1000.0
+_LIGHTEST, _OF_THRESHOLD = 0.05, 0.8
 
 # Of the shaft's length: beyond, slopes are no longer small and no linear beam holds.
 _SURVIVED = 0.05
@@ -62,6 +71,8 @@ def derived_quantities(
         told = model_error(case, foundation)
         if told:
             yield f'{foundation.name}: model error', told
+    for journal in case.journals:
+        yield from _of_journal(case, journal)
     if band_contents(case):
         yield 'edges of the band hold', band_contents(case)
 
@@ -88,6 +99,38 @@ def _of_foundation(
         unit = 'N/m' if len(dof) == 1 else 'N m/rad'
         stiffness = 'rigid' if compliance == 0.0 else f'{(1.0 / compliance).real:.4g} {unit}'
         yield f'{name}: {where} stiffness {dof}', stiffness
+
+
+def _of_journal(case: Case, journal: Journal) -> Iterator[tuple[str, str]]:
+    """Yield where the journal floats at both ends of the speed range, and what that takes."""
+    name, ends = journal.name, journal.at(np.array(case.speed_range))
+    across, up = ends.load.tolist()
+    yield f'{name}: load on the journal', (
+        f'{ends.carried:.4g} N ({across:.4g} across, {up:.4g} up), '
+        f'{1e-6 * ends.specific_load:.3g} MPa of its length and diameter')
+    if journal.oil is not None:
+        colder, warmer = (replace(journal.oil, temperature=journal.oil.temperature + change)
+                          .viscosity / journal.oil.viscosity for change in (-10.0, 10.0))
+        yield f'{name}: oil', (
+            f'ISO VG {journal.oil.grade} at {journal.oil.temperature:g} deg C, '
+            f'{1e3 * journal.oil.viscosity:.4g} mPa s; 10 K colder or warmer make '
+            f'{colder:.2f} or {warmer:.2f} of it')
+    for what, values, unit in (
+            ('Sommerfeld number', ends.sommerfeld, ''), ('eccentricity', ends.eccentricity, ''),
+            ('attitude', np.degrees(ends.attitude), ' deg'),
+            ('least film', 1e6 * ends.least, ' um'), ('loss at least', ends.loss, ' W')):
+        slow, fast = values.tolist()
+        yield f'{name}: {what}', f'{slow:.4g} to {fast:.4g}{unit} over the speed range'
+    if ends.bearing.kind == 'tilting_pad':
+        yield f'{name}: pads', ('follow vibration of the speed itself; to modes of another '
+                                'frequency they are somewhat stiffer or softer')
+    else:
+        threshold = journal.states.rigid_threshold(ends.carried / GRAVITY)
+        yield f'{name}: a rigid rotor of its load', (
+            f'whirls from {rad_s_to_rpm(threshold):.5g} rpm on (textbook)'
+            if threshold < math.inf else
+            f'whirls nowhere up to {rad_s_to_rpm(float(journal.states.speed[-1])):.5g} rpm '
+            '(textbook)')
 
 
 def model_error(case: Case, foundation: Foundation) -> str:
@@ -155,6 +198,8 @@ def warnings(case: Case) -> Iterator[str]:
             yield (f'{disc.name}: polar inertia {disc.polar_inertia:g} kg m^2 is more than twice '
                    f'the diametral {disc.diametral_inertia:g} kg m^2, which no body has')
     yield from _of_bearings(case)
+    for journal in case.journals:
+        yield from _of_film(case, journal)
     yield from _of_neighbours(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
@@ -165,10 +210,48 @@ def warnings(case: Case) -> Iterator[str]:
             yield from _of_soil(case, case.soil, foundation)
 
 
+def _of_film(case: Case, journal: Journal) -> Iterator[str]:
+    """Yield where a film is thin, heavily loaded, turbulent or about to whirl."""
+    name, bearing, states = journal.name, journal.states.bearing, journal.states
+    low, high = case.speed_range
+    thin = states.thinner(journal.least_film)
+    if thin > low:
+        yield (f'{name}: below {rad_s_to_rpm(thin):.4g} rpm the film is thinner than '
+               f'{1e6 * journal.least_film:g} um: friction is mixed and coefficients are not '
+               'those of a film')
+    if states.specific_load > _HEAVIEST:
+        yield (f'{name}: carries {1e-6 * states.specific_load:.3g} MPa of its length and '
+               f'diameter, more than {1e-6 * _HEAVIEST:g} MPa')
+    reynolds = journal.viscosity.density * journal.at(np.array([high])).reynolds[0]
+    vortices = _VORTICES * math.sqrt(bearing.radius / bearing.radial_clearance)
+    if reynolds > min(vortices, _TURBULENT):
+        what = ('is turbulent: its coefficients are larger than those of a laminar one'
+                if reynolds > _TURBULENT else 'has vortices')
+        yield (f'{name}: at {rad_s_to_rpm(high):g} rpm the film has a Reynolds number of '
+               f'{reynolds:.4g} (limit {min(vortices, _TURBULENT):.4g}) and {what}')
+    light = np.flatnonzero((states.eccentricity < _LIGHTEST) & (states.speed <= high))
+    if bearing.kind != 'tilting_pad' and len(light):
+        yield (f'{name}: from {rad_s_to_rpm(float(states.speed[light].min())):.4g} rpm on the '
+               f'eccentricity is below {_LIGHTEST:g}: so lightly loaded a film is about to whirl')
+
+
+def near_threshold(case: Case, beyond: Stability) -> Iterator[str]:
+    """Yield which mode begins to whirl too near above the speed range."""
+    high = case.speed_range[1]
+    for one in beyond.instabilities:
+        if high < one.low < high / _OF_THRESHOLD:
+            yield (f'the speed range ends at {high / one.low:.0%} of {rad_s_to_rpm(one.low):.5g} '
+                   f'rpm, from which on {one.name} grows, fed by '
+                   + ' and '.join(feed.name for feed in one.feeds)
+                   + f'; at most {_OF_THRESHOLD:.0%} are usual')
+
+
 def _of_bearings(case: Case) -> Iterator[str]:
     """Yield where a bearing or a pedestal gives energy or pushes by itself."""
+    films = {journal.name for journal in case.journals}
     for index, bearing in enumerate(case.rotor.bearings):
-        parts = [('', bearing.stiffness, bearing.damping)]
+        # Films push across by nature: what comes of it is told by the stability.
+        parts = [] if bearing.name in films else [('', bearing.stiffness, bearing.damping)]
         if bearing.pedestal is not None:
             parts.append(('pedestal.', bearing.pedestal.stiffness, bearing.pedestal.damping))
         for place, *matrices in parts:

@@ -57,7 +57,7 @@ def compare(arguments: Namespace) -> int:
 def _case(arguments: Namespace) -> Case | None:
     """Return the case that is given; None: the log carries its own."""
     if arguments.case is not None:
-        return load(arguments.case, arguments.overrides)
+        return load(arguments.case, arguments.overrides, cache_directory=arguments.cache)
     if arguments.overrides:
         raise InputError('--set: needs the CASE that it overrides')
     return None

@@ -229,6 +229,11 @@ def _add_case_verbs(verbs: _Verbs) -> None:
                           help='a force of 1 N at N times the speed instead of the unbalance; '
                                'needs --force CHANNEL')
     _add_table_output(response, acts=True)
+    bearings = _verb(verbs, 'bearings', 'sweeps:bearings',
+                     'write coefficients and oil films of all bearings as CSV')
+    bearings.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse, required=True,
+                          help='rotor speed [rpm]')
+    _add_table_output(bearings)
     _add_modal_verbs(verbs)
     plot = _verb(verbs, 'plot', 'pictures:plot', 'draw every picture of a case')
     _add_output(plot, 'DIR', 'directory for the PNG files')

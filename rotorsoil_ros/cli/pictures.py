@@ -17,6 +17,7 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.cli.table import write_table
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.figures.bearings import bearing_figures
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
@@ -34,8 +35,8 @@ def plot(arguments: Namespace) -> int:
     arguments.output.mkdir(parents=True, exist_ok=True)
     with progress('drawing') as _:
         for name, figure in chain(
-                all_figures(case, model, machine.table), _modal_figures(case, model),
-                _studies(case, model, machine.table),
+                all_figures(case, model, machine.table), bearing_figures(case),
+                _modal_figures(case, model), _studies(case, model, machine.table),
                 _soil_figures(case, model, machine.directory)):
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)

@@ -9,11 +9,13 @@ import time
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.design.report import Acceptance
+from rotorsoil_ros.case.journal_entries import BEYOND
 from rotorsoil_ros.case.summary import (
     clipped,
     derived_quantities,
     implausible,
     model_error,
+    near_threshold,
     stability_doubts,
     undecided,
     unstable,
@@ -27,7 +29,7 @@ from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.critical import asked, critical_speeds
 from rotorsoil_ros.machine.modes.names import ModeNames
-from rotorsoil_ros.machine.modes.stability import Stability
+from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.peaks import Peak, resonances
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
@@ -38,7 +40,7 @@ _FELT = 2.5
 
 def check(arguments: Namespace) -> int:
     """Print what follows from a case, where it is critical, and what looks odd."""
-    case = load(arguments.case, arguments.overrides)
+    case = load(arguments.case, arguments.overrides, cache_directory=arguments.cache)
     directory = cache.directory(arguments.cache)
     with progress('solving') as _:
         model = models.coupled_model(case, directory)
@@ -49,6 +51,9 @@ def check(arguments: Namespace) -> int:
             # The machine can be answered for all the same: its response needs no modes.
             criticals = [('critical speeds', 'not known, see the warning')]
             doubts = [undecided(case, error)]
+        if case.journals:
+            doubts += near_threshold(case, stability(
+                model, (case.speed_range[0], BEYOND * case.speed_range[1])))
     _print_table(derived_quantities(case, model.soil_models))
     _print_table(_stability(table.stability))
     _print_table(criticals)
@@ -84,7 +89,7 @@ def report(arguments: Namespace) -> int:
 
 def tabulate(arguments: Namespace) -> int:
     """Compute the tables of a case, or find them, and tell which."""
-    case = load(arguments.case, arguments.overrides)
+    case = load(arguments.case, arguments.overrides, cache_directory=arguments.cache)
     directory = cache.directory(arguments.cache)
     with progress('solving the soil') as _:
         start = time.perf_counter()

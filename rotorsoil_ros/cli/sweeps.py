@@ -1,6 +1,7 @@
 """What a case answers over a range, as CSV."""
 
 from argparse import Namespace
+import math
 import sys
 
 import numpy as np
@@ -16,11 +17,13 @@ from rotorsoil_ros.cli.table import (
     units_of,
     write_responses,
     write_sweep,
+    write_table,
 )
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.prediction import Response
+from rotorsoil_ros.rotor.journal.states import JournalStates
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
 
@@ -98,6 +101,33 @@ def _told(machine: Machine, speed: FloatArray, highest_rpm: float) -> int:
     for text in unstable(growth):
         print(f'{machine.case.path}: {text}: no steady response, NaN', file=sys.stderr)
     return 0 if stable.any() else 1
+
+
+def bearings(arguments: Namespace) -> int:
+    """Write stiffness and damping of every bearing, and where each journal floats."""
+    machine, speed = machine_of(arguments), values(arguments.rpm)
+    plant = units_of(arguments) == PLANT
+    found = machine.bearings(rpm=speed)
+    keys = speed if plant else rpm_to_rad_s(speed)
+    matrices = [f'{name}_{pair}' for name in ('stiffness', 'damping')
+                for pair in ('xx', 'xz', 'zx', 'zz')]
+    header = ['speed_rpm' if plant else 'speed_rad_s', 'bearing', 'load', 'sommerfeld',
+              'eccentricity', 'attitude_deg' if plant else 'attitude',
+              'least_film_um' if plant else 'least_film', *matrices]
+    write_table(arguments.output, header, (
+        [key, one.name, *_film(one.film, row, plant=plant), *one.stiffness[row].ravel().tolist(),
+         *one.damping[row].ravel().tolist()]
+        for row, key in enumerate(keys.tolist()) for one in found))
+    return 0
+
+
+def _film(film: JournalStates | None, row: int, *, plant: bool) -> list[float | str]:
+    """Return what the film of a journal is at one speed; nothing where there is none."""
+    if film is None:
+        return [''] * 5
+    attitude, least = float(film.attitude[row]), float(film.least[row])
+    return [film.carried, float(film.sommerfeld[row]), float(film.eccentricity[row]),
+            math.degrees(attitude) if plant else attitude, 1e6 * least if plant else least]
 
 
 def frf(arguments: Namespace) -> int:

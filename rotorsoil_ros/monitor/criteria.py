@@ -219,7 +219,7 @@ def compute_aside(file: Path, unbalance: ComplexArray, directory: Path) -> Child
 
 def _compute(arguments: Sequence[str]) -> None:
     file, directory, parts = arguments
-    case = config.load(Path(file))
+    case = config.load(Path(file), cache_directory=Path(directory))
     criteria(case, models.coupled_model(case, Path(directory)),
              np.array(json.loads(parts), dtype=float).view(complex), Path(directory))
 

@@ -139,7 +139,7 @@ class Watch:
                         self.monitor.judge.take_criteria)
 
     def _check(self) -> None:
-        config.load(self._settings.case_file(self.name))
+        config.load(self._settings.case_file(self.name), cache_directory=self._settings.cache)
 
     def _load(self) -> Machine:
         return reload(self._settings.case_file(self.name), cache_directory=self._settings.cache)

@@ -9,13 +9,15 @@ import pytest
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.figures.bearings import bearing_figures
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.response import compliance_figure, main_peaks
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.machine.modes.critical import critical_speeds
-from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
-PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
+CONFIG = Path(__file__).parents[2] / 'config'
+PAPER = CONFIG / 'paper_rotor.yaml'
 
 
 @pytest.fixture(scope='module')
@@ -115,3 +117,21 @@ def test_other_mass_ratios_are_cases_of_that_mass(paper, number, ratio):
     expected = motion.displacement[:, model.channels.index('disc_2_z')]
     # the table's own tolerance, where the response is not far below its peak
     np.testing.assert_allclose(line.get_ydata()[picks], 1e6 * np.abs(expected), rtol=1e-3)
+
+
+def test_films_are_drawn_with_what_the_rotor_stands_on():
+    case = load(CONFIG / 'turbo_blower.yaml')
+    figures = dict(bearing_figures(case))
+    assert list(figures) == ['bearing_drive_end', 'bearing_free_end']
+    place, film, stiffness, _ = figures['bearing_drive_end'].axes
+    states = case.journals[0].states
+    drawn = place.get_lines()[1]
+    np.testing.assert_allclose(np.transpose(drawn.get_data()), states.place)
+    assert film.get_lines()[0].get_ydata()[0] == pytest.approx(1e6 * states.least[0])
+    line = stiffness.get_lines()[0]
+    table = case.rotor.bearings[0].stiffness
+    np.testing.assert_allclose(
+        line.get_ydata(), 1e-6 * table(rpm_to_rad_s(line.get_xdata()))[:, 0, 0])
+    for axes in figures['bearing_drive_end'].axes:
+        assert axes.get_xlabel().endswith(']')
+        assert axes.get_ylabel().endswith(']')

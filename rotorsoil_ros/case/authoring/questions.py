@@ -7,9 +7,10 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from rotorsoil_ros.case import document, schema
+from rotorsoil_ros.case import document
 from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.case_errors import message
+from rotorsoil_ros.case.entries.entry import Entry, faults, Place
 from rotorsoil_ros.case.plausible import asked
 from rotorsoil_ros.case.quantities import (
     BalanceGrade,
@@ -103,7 +104,7 @@ QUESTIONS = (
 )
 
 
-class Answers(schema.Entry):
+class Answers(Entry):
     """What a plant knows; None is what it does not."""
 
     kind: Literal['fan', 'pump', 'motor_driven', 'turbine']
@@ -170,7 +171,7 @@ def checked(given: Mapping[str, Any]) -> Answers:
         answers = Answers.model_validate(dict(given))
     except ValidationError as error:
         wrong = [message(place, where, _with_unit(where, problem))
-                 for where, problem in schema.faults(error)]
+                 for where, problem in faults(error)]
         answers = _as_far_as_right(given, error)
     for question in QUESTIONS:
         value = getattr(answers, question.key, None)
@@ -190,7 +191,7 @@ def faults_of(question: Inquiry, value: object) -> list[str]:
     try:
         answers = Answers.model_validate({**_ANY, question.key: value})
     except ValidationError as error:
-        return [f'{question.key}: {problem}' for _, problem in schema.faults(error)]
+        return [f'{question.key}: {problem}' for _, problem in faults(error)]
     return list(question.faults(getattr(answers, question.key)))
 
 
@@ -198,13 +199,13 @@ def faults_of(question: Inquiry, value: object) -> list[str]:
 _ANY: dict[str, Any] = {'kind': 'fan', 'power_kw': 1.0, 'rpm': 1000.0}
 
 
-def _with_unit(where: schema.Place, problem: str) -> str:
+def _with_unit(where: Place, problem: str) -> str:
     unit = next((one.unit for one in QUESTIONS if one.key == where[0]), '')
     return f'{problem}, in {unit}' if problem == 'is missing' and unit else problem
 
 
 def _as_far_as_right(given: Mapping[str, Any], error: ValidationError) -> Answers:
     """Return the answers that are right by themselves, so that they are looked at too."""
-    bad = {where[0] for where, _ in schema.faults(error)}
+    bad = {where[0] for where, _ in faults(error)}
     return Answers.model_validate(
         {**_ANY, **{key: value for key, value in given.items() if key not in bad}})

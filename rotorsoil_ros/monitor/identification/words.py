@@ -148,7 +148,7 @@ def write_case(found: Identification, target: Path) -> None:
     text = _written(found.case.path)
     text = document.text_of(content, []) if text is None else edited(text, content)
     target.write_text(text if text.startswith(_HEAD) else _HEAD + text, encoding='utf-8')
-    load(target)
+    load(target, cache_directory=found.case.cache_directory)
 
 
 def _written(path: Path) -> str | None:
