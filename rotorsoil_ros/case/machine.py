@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import cache, config, document, models
 from rotorsoil_ros.case.journal_entries import bearing_states, BearingStates
-from rotorsoil_ros.case.summary import band_contents, stability_doubts, undecided, unstable
+from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.events import Profile
-from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
@@ -29,14 +27,6 @@ from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 if TYPE_CHECKING:
     from rotorsoil_ros.case.design.report import DesignReport
 
-# What a message holds of an answer, in a log that has to explain itself.
-UNITS = {
-    'position': 'displacement, m or rad, zero-to-peak',
-    'velocity': 'm/s or rad/s, zero-to-peak',
-    'effort': 'transmitted force, N or N m, zero-to-peak',
-    'phase': 'rad',
-    'convention': 'x(t) = Re(X exp(+i omega t))',
-}
 MODES = 8  # of a Campbell diagram, unless somebody asks for more
 
 Numbers: TypeAlias = float | Sequence[float] | FloatArray
@@ -345,31 +335,7 @@ class Machine:
 
     def description(self, name: str, unbalance: ComplexArray) -> Mapping[str, object]:
         """Return what the predictions under this name and this unbalance, (p,), rest on."""
-        return {
-            'machine': name, 'case': self.case.name, 'version': rotorsoil_ros.__version__,
-            'support': self.case.support.model,
-            'tables': {'response': self.table.key, **self._compliance_keys()},
-            'accuracy': self.table.accuracy if math.isfinite(self.table.accuracy) else None,
-            'speed_range_rad_s': list(self.table.speed_range),
-            'stable': not self.table.stability.instabilities and not self.table.stability.doubt,
-            'unstable_rad_s': self.table.stability.unstable.tolist(),
-            'unstable': list(unstable(self.table.stability)),
-            'doubts': list(stability_doubts(self.table.stability)),
-            'band_holds': band_contents(self.case),
-            'gaps_rad_s': self.table.gaps.tolist(), 'channels': list(self.table.channels),
-            'unbalance': {
-                disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
-                for disc, value in zip(self.table.planes, unbalance, strict=True)},
-            'units': UNITS,
-            # All that is needed to compare the log with the case again.
-            'document': self.case.content, 'files': self.case.files,
-        }
-
-    def _compliance_keys(self) -> dict[str, str]:
-        return {f'compliance of {foundation.name}': models.key_of(soil)
-                for foundation, soil in zip(self.model.foundations, self.model.soil_models,
-                                            strict=True)
-                if isinstance(soil, InfiniteElementModel)}
+        return models.description(self.case, self.model, self.table, name, unbalance)
 
     def _undecided(self, error: NotSolvedError) -> InputError:
         """Return the same error with the key of the case that is to blame."""

@@ -3,10 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+import math
 from pathlib import Path
 
+import numpy as np
+
+import rotorsoil_ros
+from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case, infinite_range
+from rotorsoil_ros.case.summary import band_contents, stability_doubts, unstable
 from rotorsoil_ros.errors import InputError, RotorSoilError, solved
 from rotorsoil_ros.ground.accuracy import mapping_error
 from rotorsoil_ros.ground.cone import ConeModel
@@ -25,6 +31,15 @@ from rotorsoil_ros.machine.band import (
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 from rotorsoil_ros.machine.spread import Place, SoilSpread
+
+# What a message holds of an answer, in a log that has to explain itself.
+UNITS = {
+    'position': 'displacement, m or rad, zero-to-peak',
+    'velocity': 'm/s or rad/s, zero-to-peak',
+    'effort': 'transmitted force, N or N m, zero-to-peak',
+    'phase': 'rad',
+    'convention': 'x(t) = Re(X exp(+i omega t))',
+}
 
 # Rectangles that are longer than any that was measured are taken to be off by this.
 _LARGEST_MAPPING = 0.5
@@ -247,3 +262,29 @@ def _other_forms(
     except RotorSoilError:  # beyond the reach of infinite elements: `band_contents` says so
         return [], stiffer
     return elements, stiffer
+
+
+def description(
+    case: Case, model: CoupledModel, table: ResponseTable, name: str, unbalance: ComplexArray,
+) -> dict[str, object]:
+    """Return what predictions under a name and an unbalance, (p,), rest on."""
+    stable = table.stability
+    compliances = {f'compliance of {foundation.name}': key_of(soil) for foundation, soil in zip(
+        model.foundations, model.soil_models, strict=True)
+        if isinstance(soil, InfiniteElementModel)}
+    return {
+        'machine': name, 'case': case.name, 'version': rotorsoil_ros.__version__,
+        'support': case.support.model, 'tables': {'response': table.key, **compliances},
+        'accuracy': table.accuracy if math.isfinite(table.accuracy) else None,
+        'speed_range_rad_s': list(table.speed_range),
+        'stable': not stable.instabilities and not stable.doubt,
+        'unstable_rad_s': stable.unstable.tolist(), 'unstable': list(unstable(stable)),
+        'doubts': list(stability_doubts(stable)), 'band_holds': band_contents(case),
+        'gaps_rad_s': table.gaps.tolist(), 'channels': list(table.channels),
+        'unbalance': {
+            disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
+            for disc, value in zip(table.planes, unbalance, strict=True)},
+        'units': UNITS,
+        # All that is needed to compare the log with the case again.
+        'document': case.content, 'files': case.files,
+    }

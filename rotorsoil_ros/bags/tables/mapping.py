@@ -19,7 +19,7 @@ from rotorsoil_ros.bags.tables.cells import (
     TIME_UNITS,
 )
 from rotorsoil_ros.case import document
-from rotorsoil_ros.case.schema import Entry, faults
+from rotorsoil_ros.case.entries.entry import Entry, faults
 from rotorsoil_ros.errors import InputError
 
 Column: TypeAlias = str | int
