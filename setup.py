@@ -83,5 +83,7 @@ setup(
             f'rotorsoil = {NAME}.cli:main',
             f'rotorsoil_node = {NAME}.node:main',
         ],
+        # Called as its module, so that naming it by hand does not load it twice.
+        'pytest11': [f'{NAME}.testing.plugin = {NAME}.testing.plugin'],
     },
 )

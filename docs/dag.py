@@ -10,8 +10,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'rotorsoil_ros'
-TOP = ['cli', 'node', 'screen', 'figures', 'bags', 'wire', 'monitor', 'case', 'machine', 'rotor',
-       'ground', 'base']
+TOP = ['cli', 'testing', 'node', 'screen', 'figures', 'bags', 'wire', 'monitor', 'case',
+       'machine', 'rotor', 'ground', 'base']
 # Column and row of each wing, and what it is for.
 PLACES = {
     'base': (1, 7, 'arrays, errors, units, channels, events'),
@@ -26,6 +26,7 @@ PLACES = {
     'screen': (2, 1.2, 'recording, live view'),
     'node': (1, 0.2, 'the ROS graph'),
     'cli': (1, -0.8, 'verbs: parse, call, print'),
+    'testing': (2, -0.8, 'tests of those who talk to it'),
 }
 WIDTH, HEIGHT, BOX, TALL = 700, 640, 200, 44
 
@@ -48,7 +49,7 @@ def drawing() -> str:
     """Return the wings as an SVG; an arrow points at what a wing takes from."""
     lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
              'role="img" font-family="sans-serif" text-anchor="middle">',
-             '<title>Twelve wings; an arrow points at what a wing takes from</title>',
+             '<title>Wings; an arrow points at what a wing takes from</title>',
              '<defs><marker id="head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" '
              'markerHeight="8" orient="auto"><path d="M0,0 L8,4 L0,8 z" fill="#667"/></marker>'
              '</defs>', f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>']

@@ -4,30 +4,18 @@ import os
 import subprocess
 import sys
 import time
-import warnings
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 import numpy as np
-import rclpy
-from rclpy.context import Context
-from rclpy.experimental import EventsExecutor
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.node.node import RotorsoilNode
+from rotorsoil_ros.testing.graph import DOMAIN
 from rotorsoil_ros.wire.messages import moduli, phases
 
-with warnings.catch_warnings():
-    warnings.simplefilter('ignore', DeprecationWarning)  # lark still imports sre_parse
-    import rosidl_generator_py  # noqa: F401 - rclpy imports it with the first message
-
-# For what hangs: nothing here is about how fast something is, benchmarks are.
-DEADLINE_S = 600.0
-# Its ports stay below those that the system hands out.
-DOMAIN = 1 + os.getpid() % 100
 STAMP = 1_700_000_000_000_000_001
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -42,42 +30,6 @@ def stamp_ns(message):
     return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
 
 
-class Graph:
-    """A ROS context on a domain of this process, a probe node in it, and who spins them."""
-
-    def __init__(self):
-        self.context = Context()
-        rclpy.init(args=[], context=self.context, domain_id=DOMAIN)
-        self.executor = EventsExecutor(context=self.context)
-        self.nodes = []
-        self.probe = self.add(Node('probe', context=self.context))
-
-    def add(self, node):
-        self.nodes.append(node)
-        self.executor.add_node(node)
-        return node
-
-    def use(self, executor):
-        """Have everybody spun by another executor."""
-        self.executor.shutdown()
-        self.executor = executor(context=self.context)
-        for node in self.nodes:
-            self.executor.add_node(node)
-
-    def until(self, holds, what='what was awaited'):
-        """Spin until something holds; fail at the deadline."""
-        deadline = time.monotonic() + DEADLINE_S
-        while not holds():
-            assert time.monotonic() < deadline, f'{what} did not happen in {DEADLINE_S} s'
-            self.executor.spin_once(timeout_sec=0.05)
-
-    def close(self):
-        for node in reversed(self.nodes):
-            node.destroy_node()
-        self.executor.shutdown()
-        self.context.try_shutdown()
-
-
 class Bench:
     """A node under test, and a probe that talks and listens to it."""
 
@@ -86,7 +38,6 @@ class Bench:
         self.case_file = str(case_file)
         self.probe = graph.probe
         self.cache = str(cache)
-        self.heard = {}
 
     def node(self, *machines, **parameters):
         """Create a node; a keyword a__b sets the parameter a.b."""
@@ -106,9 +57,7 @@ class Bench:
 
     def hear(self, topic, kind=JointState, profile=1000):
         """Collect the messages of a topic."""
-        heard = self.heard.setdefault(topic, [])
-        self.probe.create_subscription(kind, topic, heard.append, profile)
-        return heard
+        return self.graph.hear(topic, kind, profile)
 
     def answers(self, machine='fan'):
         """Collect amplitudes and phases of a machine."""
@@ -117,32 +66,22 @@ class Bench:
     def speaker(self, topic='/fan/joint_states', kind=JointState, listeners=('amplitude', 'phase'),
                 reliability=ReliabilityPolicy.RELIABLE):
         """Return what publishes, once everybody who matters has found each other."""
-        publisher = self.probe.create_publisher(
-            kind, topic, QoSProfile(depth=1000, reliability=reliability))
         machine = topic.split('/')[1]
-        self.graph.until(lambda: publisher.get_subscription_count() and all(
+        publisher = self.graph.speaker(topic, kind, reliability)
+        self.graph.until(lambda: all(
             self.probe.count_publishers(f'/rotorsoil/{machine}/{name}') for name in listeners),
             'discovery')
         self.settle()
         return publisher.publish
 
     def settle(self):
-        """Wait until the probe's subscriptions are matched on both sides."""
-        for node in self.graph.nodes[1:]:
-            for publisher in node.publishers:
-                if publisher.topic_name in self.heard:
-                    self.graph.until(publisher.get_subscription_count, 'matching')
+        self.graph.settle()
 
     def ask(self, kind, name, request):
-        """Call a service; return the future of its answer."""
-        client = self.probe.create_client(kind, name)
-        self.graph.until(client.service_is_ready, name)
-        return client.call_async(request)
+        return self.graph.ask(kind, name, request)
 
     def call(self, kind, name, request):
-        future = self.ask(kind, name, request)
-        self.graph.until(future.done, name)
-        return future.result()
+        return self.graph.call(kind, name, request)
 
     def change(self, transition):
         return self.call(ChangeState, '/rotorsoil/change_state', ChangeState.Request(

@@ -21,13 +21,14 @@ DAG = {
     BASE: set(), 'ground': {BASE}, 'rotor': {BASE}, 'machine': {'ground', 'rotor'},
     'case': {'machine'}, 'monitor': {'case'}, 'wire': {'monitor'}, 'bags': {'wire'},
     'figures': {'monitor'}, 'screen': {'monitor'}, 'node': {'bags', 'figures', 'screen'},
-    'cli': {'node'},
+    'cli': {'node'}, 'testing': {'node'},
 }
 # The package itself: its names are looked up when somebody asks, so that it may name every wing.
 FACE = 'rotorsoil_ros'
 # What only these wings may import, at the top or lazily.
 OWNERS = {
-    **{name: {'node'} for name in ROS}, 'rerun': {'screen'}, 'mcap': {'bags'},
+    **{name: {'node', 'testing'} for name in ROS}, 'pytest': {'testing'},
+    'rerun': {'screen'}, 'mcap': {'bags'},
     'matplotlib': {'figures'}, 'pandas': {BASE}, 'xarray': {BASE}, 'pydantic': {'case', 'bags'},
     'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags'},
     'pyarrow': {'bags', 'screen'},  # rerun itself needs it
@@ -193,7 +194,8 @@ def test_channel_that_is_taken_apart_is_seen(line, tmp_path):
 
 
 def test_nothing_below_the_node_reads_the_clock():
-    readers = {name_of(path) for path in ROOMS if wing_of(name_of(path)) not in ('node', 'cli')
+    readers = {name_of(path) for path in ROOMS if wing_of(name_of(path))
+               not in ('node', 'cli', 'testing')
                and {'time', 'datetime'} & set(imported_by(path))}
     # One writes stamps as dates, the other reads dates as stamps.
     assert readers <= {'rotorsoil_ros.bags.recover', 'rotorsoil_ros.bags.tables.cells'}

@@ -79,6 +79,13 @@ def test_entry_points_can_be_called(arguments):
         assert f'def {function}(' in source.read_text()
 
 
+def test_the_plugin_of_pytest_is_there_under_its_own_name(arguments):
+    [entry] = arguments['entry_points']['pytest11']
+    name, module = entry.split(' = ')
+    assert name == module  # so that `-p` of this repository and an installed one are the same
+    assert (ROOT / Path(*module.split('.'))).with_suffix('.py').is_file()
+
+
 def test_data_files_exist_and_hold_every_case(arguments):
     installed = dict(arguments['data_files'])
     assert installed['share/ament_index/resource_index/packages'] == ['resource/rotorsoil_ros']

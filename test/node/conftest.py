@@ -2,7 +2,9 @@
 
 import pytest
 
-from graphs import Bench, Graph, Processes
+from rotorsoil_ros.testing.graph import Graph
+
+from graphs import Bench, Processes
 
 
 @pytest.fixture

@@ -21,18 +21,9 @@ from std_srvs.srv import Trigger
 from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.retention import new_directory
 from rotorsoil_ros.node.node import Survived
+from rotorsoil_ros.testing.graph import DEADLINE_S, DOMAIN
 
-from graphs import (
-    assert_answers,
-    Bench,
-    DEADLINE_S,
-    DOMAIN,
-    exact,
-    joint_state,
-    LATCHED,
-    STAMP,
-    stamp_ns,
-)
+from graphs import assert_answers, Bench, exact, joint_state, LATCHED, STAMP, stamp_ns
 from records import topics_of
 
 

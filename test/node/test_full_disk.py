@@ -13,8 +13,9 @@ import yaml
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.recover import recover
+from rotorsoil_ros.testing.graph import DEADLINE_S
 
-from graphs import DEADLINE_S, speak, stamp_ns
+from graphs import speak, stamp_ns
 from records import topics_of
 
 AMPLITUDE = '/rotorsoil/fan/amplitude'

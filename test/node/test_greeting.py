@@ -15,9 +15,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32, Int32
 
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.testing.graph import DEADLINE_S
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 
-from graphs import assert_answers, DEADLINE_S, exact, joint_state, STAMP, stamp_ns
+from graphs import assert_answers, exact, joint_state, STAMP, stamp_ns
 
 
 @pytest.fixture

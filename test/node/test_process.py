@@ -10,9 +10,10 @@ from mcap.reader import NonSeekingReader
 import pytest
 
 from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.testing.graph import DEADLINE_S
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 
-from graphs import DEADLINE_S, speak
+from graphs import speak
 from records import topics_of
 
 AMPLITUDE = '/rotorsoil/fan/amplitude'

@@ -20,10 +20,10 @@ from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.node.node import RotorsoilNode
 from rotorsoil_ros.node.replay import replay
+from rotorsoil_ros.testing.graph import DEADLINE_S
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
-from graphs import DEADLINE_S
 from records import topics_of
 
 FAN = Path('config/plant_fan.yaml')

@@ -9,8 +9,8 @@ import pytest
 from rotorsoil_ros.bags.retention import make_room, MARKER, new_directory
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
+from rotorsoil_ros.testing.graph import DEADLINE_S
 
-from graphs import DEADLINE_S
 from recordings import column, predicted
 from records import joint_records, START
 

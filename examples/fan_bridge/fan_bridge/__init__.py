@@ -1,0 +1,1 @@
+"""Bring the rpm of a PLC to the twin of a fan."""
