@@ -25,7 +25,7 @@ FIRST_NS = 1_700_000_000 * NANOSECONDS  # stamp of the first speed that nobody d
 STEP_NS = NANOSECONDS // 100
 
 
-class Answer:
+class TwinAnswer:
     """What the node answered to one speed: a JointState, read by channel."""
 
     def __init__(self, message: Any) -> None:
@@ -112,19 +112,19 @@ class Heard:
         """How many have come."""
         return len(self._messages)
 
-    def receive(self) -> Answer:
+    def receive(self) -> TwinAnswer:
         """Return the next answer; wait for it."""
         self.wait_for(self._taken + 1)
         self._taken += 1
-        return Answer(self._messages[self._taken - 1])
+        return TwinAnswer(self._messages[self._taken - 1])
 
-    def wait_for(self, count: int) -> list[Answer]:
+    def wait_for(self, count: int) -> list[TwinAnswer]:
         """Wait until so many answers have come; return all of them."""
         try:
             self._twin.graph.until(lambda: len(self._messages) >= count, f'{self._name}')
         except AssertionError as error:
             raise AssertionError(f'{error}; the node says: {self._twin.says}') from error
-        return [Answer(message) for message in self._messages]
+        return [TwinAnswer(message) for message in self._messages]
 
 
 class Twin:
