@@ -1,14 +1,19 @@
-"""The array types of the floor."""
+"""The array types of the floor, and what is taken for one."""
 
+from collections.abc import Sequence
+import math
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from rotorsoil_ros.errors import RotorSoilError
+
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 IntArray: TypeAlias = npt.NDArray[np.int64]
+Numbers: TypeAlias = float | Sequence[float] | FloatArray
 
 
 def prominent_peaks(level: FloatArray, prominence: float) -> list[int]:
@@ -41,3 +46,14 @@ def prominent_peaks(level: FloatArray, prominence: float) -> list[int]:
         if height - max(valleys) >= prominence:
             peaks.append((left + 1 + right) // 2)
     return peaks
+
+
+def numbers(name: str, given: Numbers) -> FloatArray:
+    """Return finite numbers >= 0 as a flat array, (n,)."""
+    found = np.atleast_1d(np.asarray(given, dtype=float))
+    if found.ndim != 1 or not len(found):
+        raise RotorSoilError(f'{name} must be one number or some, got shape {found.shape}')
+    wrong = found[~((found >= 0.0) & (found < math.inf))]
+    if len(wrong):
+        raise RotorSoilError(f'{name} must be >= 0 and finite, got {wrong[0]:g}')
+    return found

@@ -208,3 +208,18 @@ def test_bad_command_line_is_one_line_and_status_2(arguments, problem, capsys):
     said = capsys.readouterr().err
     assert said.startswith(f'rotorsoil {arguments[0]}: {problem}')
     assert said.count('\n') == 1
+
+
+def test_criticals_tell_where_their_damping_comes_from(capsys):
+    path = str(ROOT / 'config' / 'plant_fan.yaml')
+    assert main(['campbell', path, '--criticals', '--damping']) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert float(rows[0]['radiation_share']) == pytest.approx(0.834, abs=2e-3)
+    assert float(rows[0]['soil_material_share']) == pytest.approx(0.166, abs=2e-3)
+    assert rows[0]['pedestals_share'] == rows[0]['soil_share'] == ''
+    assert main(['campbell', path, '--rpm', '1:2:2', '--damping']) == 2
+    assert '--damping needs --criticals' in capsys.readouterr().err
+    assert main(['check', path]) == 0
+    told = capsys.readouterr().out
+    assert 'damping ratio 0.16 (radiation 83.4%, soil material 16.6%, bearings 0.0%)' in told
+    assert 'damping at 1800 rpm' in told

@@ -5,18 +5,19 @@ from dataclasses import dataclass
 from functools import cached_property
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, Numbers, numbers
 from rotorsoil_ros.case import cache, config, document, models
 from rotorsoil_ros.case.journal_entries import bearing_states, BearingStates
 from rotorsoil_ros.case.summary import undecided
-from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
+from rotorsoil_ros.errors import InputError, NotSolvedError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter
 from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.modes.stability import Stability, stability
@@ -28,9 +29,6 @@ if TYPE_CHECKING:
     from rotorsoil_ros.case.design.report import DesignReport
 
 MODES = 8  # of a Campbell diagram, unless somebody asks for more
-
-Numbers: TypeAlias = float | Sequence[float] | FloatArray
-
 
 @dataclass(frozen=True)
 class Machine:
@@ -94,7 +92,7 @@ class Machine:
             If an undamped resonance is hit.
 
         """
-        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        speed = rpm_to_rad_s(numbers('rpm', rpm))
         found = Response.of(self.model.channels,
                             self.model.unbalance_response(speed, self.case.unbalance))
         return found.where(self._growth(speed).holds(speed))
@@ -117,7 +115,7 @@ class Machine:
 
         """
         return bearing_states(self.case.rotor, self.case.journals,
-                              rpm_to_rad_s(_numbers('rpm', rpm)))
+                              rpm_to_rad_s(numbers('rpm', rpm)))
 
     def frf(self, *, force: str, hz: Numbers, rpm: float = 0.0) -> Response:
         """
@@ -146,7 +144,7 @@ class Machine:
 
         """
         columns_of(self.model.channels, force)
-        omega, speed = hz_to_rad_s(_numbers('hz', hz)), rpm_to_rad_s(_numbers('rpm', rpm))
+        omega, speed = hz_to_rad_s(numbers('hz', hz)), rpm_to_rad_s(numbers('rpm', rpm))
         found = self.model.frequency_response(omega, speed=float(speed[0]), channel=force)
         return found.where(np.repeat(self._growth(speed).holds(speed[:1]), len(omega)))
 
@@ -165,7 +163,7 @@ class Machine:
 
         """
         columns_of(self.model.channels, force)
-        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        speed = rpm_to_rad_s(numbers('rpm', rpm))
         found = self.model.harmonic_response(speed, order=order, channel=force)
         return found.where(self._growth(speed).holds(speed))
 
@@ -186,7 +184,7 @@ class Machine:
 
         """
         low, high = ((0.0, self.case.speed_range[1]) if rpm_range is None
-                     else rpm_to_rad_s(_numbers('rpm_range', rpm_range)).tolist())
+                     else rpm_to_rad_s(numbers('rpm_range', rpm_range)).tolist())
         try:
             return stability(self.model, (low, high))
         except NotSolvedError as error:
@@ -220,7 +218,7 @@ class Machine:
             If what is known of the support does not determine the modes.
 
         """
-        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        speed = rpm_to_rad_s(numbers('rpm', rpm))
         try:
             return campbell(self.model, speed, modes)
         except NotSolvedError as error:
@@ -244,11 +242,30 @@ class Machine:
 
         """
         low, high = (self.case.speed_range if rpm_range is None
-                     else rpm_to_rad_s(_numbers('rpm_range', rpm_range)).tolist())
+                     else rpm_to_rad_s(numbers('rpm_range', rpm_range)).tolist())
         try:
             return critical_speeds(self.model, (low, high))
         except NotSolvedError as error:
             raise self._undecided(error) from error
+
+    def damping_split(self, *, rpm: Numbers) -> DampingSplit:
+        """
+        Return where the energy of the unbalance goes: bearings, soil material, radiation.
+
+        Parameters
+        ----------
+        rpm : float or (n,) floats
+            Rotor speeds [rpm].
+
+        Returns
+        -------
+        DampingSplit
+            Work of every part [J] per cycle; NaN where the machine is unstable.
+
+        """
+        speed = rpm_to_rad_s(numbers('rpm', rpm))
+        found = DampingSplitter(self.model).forced(speed, self.case.unbalance)
+        return found.where(self._growth(speed).holds(speed))
 
     def band(self, *, rpm: Numbers) -> Bounds:
         """
@@ -283,7 +300,7 @@ class Machine:
 
     def bounds(self, *, rpm: Numbers) -> Bounds:
         """Return the same as `band`; without a band NaN on both sides of the response."""
-        speed = rpm_to_rad_s(_numbers('rpm', rpm))
+        speed = rpm_to_rad_s(numbers('rpm', rpm))
         nominal = self.table.predictor(self.case.unbalance).answer(speed).displacement
         if self.envelope is None:
             none = np.full(nominal.shape, math.nan)
@@ -313,7 +330,7 @@ class Machine:
         """
         from rotorsoil_ros.case.design.study import design_report  # half of it is words
 
-        return design_report(self, float(_numbers('rpm', rpm)[0]))
+        return design_report(self, float(numbers('rpm', rpm)[0]))
 
     def predict(self, profile: Profile) -> Response:
         """
@@ -372,14 +389,3 @@ def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: 
     document.replace_keys(content, overrides)
     return Machine(config.case_of(path, content, cache_directory=cache_directory),
                    cache.directory(cache_directory))
-
-
-def _numbers(name: str, given: Numbers) -> FloatArray:
-    """Return finite numbers >= 0 as a flat array, (n,)."""
-    found = np.atleast_1d(np.asarray(given, dtype=float))
-    if found.ndim != 1 or not len(found):
-        raise RotorSoilError(f'{name} must be one number or some, got shape {found.shape}')
-    wrong = found[~((found >= 0.0) & (found < math.inf))]
-    if len(wrong):
-        raise RotorSoilError(f'{name} must be >= 0 and finite, got {wrong[0]:g}')
-    return found

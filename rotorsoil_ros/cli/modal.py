@@ -12,6 +12,7 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter, DAMPERS
 from rotorsoil_ros.machine.modes.critical import asked
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 
@@ -25,6 +26,8 @@ def campbell(arguments: Namespace) -> int:
         raise InputError('--rpm is missing; only --criticals has the speed range of the case')
     if arguments.running is not None:
         raise InputError('--running needs --criticals')
+    if arguments.damping:
+        raise InputError('--damping needs --criticals')
     with progress('solving') as _:
         given = {} if arguments.modes is None else {'modes': arguments.modes}
         found = machine.campbell(rpm=values(arguments.rpm), **given)
@@ -70,12 +73,22 @@ def _criticals(arguments: Namespace, machine: Machine) -> int:
         rows = [(*row, one.critical.amplification_factor, one.margin, one.required,
                  one.half_power_factor, one.name) for row, one in zip(
             rows, separation_margins(machine.model, criticals, running), strict=True)]
+    if arguments.damping:
+        header += [f'{kind.replace(" ", "_")}_share' for kind in DAMPERS]
+        rows = [(*row, *_shares(split)) for row, split in zip(
+            rows, DampingSplitter(machine.model).of_modes(criticals), strict=True)]
     _tell_unstable(machine, high)
     if not rows:
         print(f'{machine.case.path}: no critical speed from {low:g} up to {high:g} rpm',
               file=sys.stderr)
     write_table(arguments.output, header, rows)
     return 0
+
+
+def _shares(split: DampingSplit | None) -> list[float | str]:
+    """Return the share of every kind; nothing where a mode has none, or hardly swings."""
+    return ['' if split is None or kind not in split.kinds else float(split.share(kind)[0])
+            for kind in DAMPERS]
 
 
 def _range_of(arguments: Namespace, machine: Machine) -> tuple[float, float]:

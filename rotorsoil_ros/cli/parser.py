@@ -263,6 +263,9 @@ def _add_modal_verbs(verbs: _Verbs) -> None:
     campbell.add_argument('--running', metavar='R', type=_rpm,
                           help='with --criticals: running speed [rpm], from which separation '
                                'margins (API 617) are written too')
+    campbell.add_argument('--damping', action='store_true',
+                          help='with --criticals: also which share of the damping is of the '
+                               'bearings, pedestals, radiation, material of the soil')
     _add_table_output(campbell)
 
 

@@ -18,6 +18,7 @@ from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.cli.table import write_table
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.figures.bearings import bearing_figures
+from rotorsoil_ros.figures.damping import damping_figure
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
@@ -48,8 +49,10 @@ def _modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, 'Figu
     """Yield the pictures of the modes, or say why there are none."""
     try:
         yield from modal_figures(case, model)
+        if np.any(case.unbalance):
+            yield 'damping', damping_figure(case, model)
     except NotSolvedError as error:
-        print(f'no pictures campbell, critical_shapes, orbits, shapes: {case.path}: '
+        print(f'no pictures campbell, critical_shapes, damping, orbits, shapes: {case.path}: '
               f'{undecided(case, error)}', file=sys.stderr)
 
 

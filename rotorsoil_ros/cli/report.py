@@ -6,6 +6,8 @@ from itertools import chain
 from pathlib import Path
 import time
 
+import numpy as np
+
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.design.report import Acceptance
@@ -27,6 +29,7 @@ from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.damping import DampingSplitter
 from rotorsoil_ros.machine.modes.critical import asked, critical_speeds
 from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.modes.stability import Stability, stability
@@ -59,6 +62,7 @@ def check(arguments: Namespace) -> int:
     _print_table(criticals)
     peaks = _peaks(case, table)
     _print_table(_of_peaks(peaks))
+    _print_table(_of_damping(case, model, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
                          warnings(case)):
@@ -163,9 +167,12 @@ def _criticals(
     wanted = low, asked(high)[1]
     span = model.within_tables(wanted)
     names, lines = ModeNames(model), []
-    for critical in critical_speeds(model, span):
+    criticals = critical_speeds(model, span)
+    for critical, split in zip(criticals, DampingSplitter(model).of_modes(criticals),
+                               strict=True):
         how = [f'{"forward" if critical.whirl > 0 else "backward"}',
-               f'damping ratio {critical.damping_ratio:.2g}']
+               f'damping ratio {critical.damping_ratio:.2g}'
+               + ('' if split is None else f' ({split.words(0)})')]
         if critical.amplification_factor < _FELT:
             how.append('hardly felt')
         if critical.speed > high:
@@ -191,6 +198,19 @@ def _of_peaks(peaks: Sequence[Peak]) -> Iterable[tuple[str, str]]:
                f'{1e6 * peak.amplitude:.4g} um zero-to-peak at {peak.channel}')
     if not peaks:
         yield 'peaks of the response', 'none in the speed range'
+
+
+def _of_damping(
+    case: Case, model: CoupledModel, peaks: Sequence[Peak],
+) -> Iterable[tuple[str, str]]:
+    """Yield what takes the energy of the unbalance at every peak, and at the highest speed."""
+    if not np.any(case.unbalance):
+        return
+    speed = np.array([*(peak.speed for peak in peaks), case.speed_range[1]])
+    split = DampingSplitter(model).forced(speed, case.unbalance)
+    for row, at in enumerate(speed.tolist()):
+        yield (f'damping at {rad_s_to_rpm(at):.6g} rpm',
+               f'{split.words(row)}, of {split.power[row]:.3g} W')
 
 
 def _print_table(lines: Iterable[tuple[str, str]]) -> None:

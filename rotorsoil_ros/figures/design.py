@@ -116,8 +116,9 @@ def _modes(report: DesignReport) -> str:
     if not nearest:
         return f'<p>{escape(report.modes.doubt or "None.")}</p>'
     return html.table(
-        ['mode', 'rpm', 'damping', 'margin', 'asked', ''],
+        ['mode', 'rpm', 'damping', 'most of it by', 'margin', 'asked', ''],
         [[one.name, f'{one.critical.speed_rpm:.0f}', f'{one.critical.damping_ratio:.1%}',
+          '-' if one.split is None else one.split.words(0).split(',')[0],
           f'{one.margin:.0%}', f'{one.required:.0%}' if one.required else 'none',
           'too near' if one.is_missed else 'kept'] for one in nearest])
 
@@ -126,7 +127,9 @@ def _stability(report: DesignReport) -> str:
     said = {True: 'Stable: every vibration of the machine decays at this speed.',
             False: 'Unstable: a vibration grows on its own at this speed.',
             None: 'Whether the machine is stable at this speed is not known.'}
-    return f'<p>{said[report.stable]}</p>'
+    split = '' if report.damping is None else (
+        f' Damped by {report.damping.words(0)}: of {report.damping.power[0]:.3g} W.')
+    return f'<p>{said[report.stable]}{split}</p>'
 
 
 def _decides(influences: Sequence[Influence]) -> str:

@@ -9,7 +9,7 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.soil import Contact, Soil, SoilModel, static_scale
+from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel, static_scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,3 +69,12 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
             return NeighbourSoil(InfiniteElementModel(as_solved, contact, table),
                                  soil.poisson_ratio)
     raise RotorSoilError(f'a support of type {type(model).__name__} does not depend on the soil')
+
+
+def without_loss(model: SoilModel, contact: Contact) -> SoilModel | None:
+    """Return a model on the same soil without material damping; None where it knows of none."""
+    if isinstance(model, RigidSoil):
+        return model
+    if isinstance(model, (BoundaryElementModel, ConeModel, InfiniteElementModel)):
+        return on_soil(model, replace(model.soil, loss_factor=0.0), contact)
+    return None

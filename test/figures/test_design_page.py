@@ -19,7 +19,7 @@ BROWSER = shutil.which('chromium') or shutil.which('google-chrome')
 
 # What the page of numbers has to hold.
 KEYS = {'verdict', 'speed_rpm', 'housings', 'modes', 'stable', 'inputs', 'assumptions', 'guesses',
-        'not_modelled', 'decides', 'next_step'}
+        'not_modelled', 'decides', 'next_step', 'damping'}
 
 
 class Sources(HTMLParser):
@@ -65,6 +65,8 @@ def test_page_is_whole_by_itself_and_says_what_its_numbers_say(tmp_path, capsys)
                  *(one['name'] for one in numbers['modes']),
                  *(one['housing'] for one in numbers['housings'])):
         assert said in text
+    assert sum(numbers['damping']['shares'].values()) == pytest.approx(1.0)
+    assert f"Damped by radiation {numbers['damping']['shares']['radiation']:.1%}" in text
     for one in numbers['housings']:
         assert f'{one["velocity_mm_s_rms"][2]:.3g}' in text
         assert f'{one["displacement_um_pp"][1]:.3g}' in text

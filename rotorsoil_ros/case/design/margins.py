@@ -7,6 +7,7 @@ import math
 from rotorsoil_ros.case.summary import clipped
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter
 from rotorsoil_ros.machine.modes.critical import asked, critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.peaks import half_power_factors
@@ -32,6 +33,8 @@ class SeparationMargin:
         Amplification factor by the response; NaN where it has no peak of this mode.
     margin, required : float
         Distance as a share of the running speed, and the least that it should be [-].
+    split : DampingSplit or None
+        Where the damping of the mode comes from; None where it hardly swings.
 
     """
 
@@ -40,6 +43,7 @@ class SeparationMargin:
     half_power_factor: float
     margin: float
     required: float
+    split: DampingSplit | None
 
     @property
     def is_missed(self) -> bool:
@@ -55,9 +59,10 @@ def separation_margins(
     names = ModeNames(model)
     return [SeparationMargin(
         names.of_critical(critical), critical, half_power, critical.separation_margin(running),
-        critical.required_margin(running, half_power=half_power))
-        for critical, half_power in zip(
-            criticals, half_power_factors(model, criticals), strict=True)]
+        critical.required_margin(running, half_power=half_power), split)
+        for critical, half_power, split in zip(
+            criticals, half_power_factors(model, criticals),
+            DampingSplitter(model).of_modes(criticals), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

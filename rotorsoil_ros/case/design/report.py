@@ -16,6 +16,7 @@ from rotorsoil_ros.case.design.influence import Influence
 from rotorsoil_ros.case.design.margins import NearModes, SeparationMargin
 from rotorsoil_ros.case.zone_limits import SupportClass, Zone, zone
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.machine.damping import DampingSplit
 from rotorsoil_ros.units import rad_s_to_rpm, to_mm_s_rms, to_um_pp
 
 # Modes on the page.
@@ -101,6 +102,8 @@ class DesignReport:
         Those that can move at all, the worst first.
     modes : NearModes
         Critical speeds about it.
+    damping : DampingSplit or None
+        Where the energy of the unbalance goes; None without one, or without a steady answer.
     influences : tuple of Influence
         What each uncertain input does to the worst housing, the strongest first.
     next_step : str
@@ -119,6 +122,7 @@ class DesignReport:
     stable: bool | None
     housings: tuple[HousingAnswer, ...]
     modes: NearModes
+    damping: DampingSplit | None
     influences: tuple[Influence, ...]
     next_step: str
     assumptions: tuple[str, ...]
@@ -145,6 +149,8 @@ class DesignReport:
             'housings': [_housing(one) for one in self.housings],
             'modes': [_mode(one) for one in self.modes.nearest(NEAREST)],
             'modes_searched_rpm': [rad_s_to_rpm(speed) for speed in self.modes.span],
+            'damping': None if self.damping is None else {
+                'power_w': float(self.damping.power[0]), 'shares': self.damping.shares(0)},
             'decides': _influence(self.influences[0]) if self.influences else None,
             'influences': [_influence(one) for one in self.influences],
             'next_step': self.next_step, 'zone_limits': self.case.zones.label,
@@ -174,6 +180,7 @@ def _mode(one: SeparationMargin) -> Mapping[str, Any]:
         'name': one.name, 'rpm': critical.speed_rpm, 'damping_ratio': critical.damping_ratio,
         'whirl': 'forward' if critical.whirl > 0 else 'backward', 'margin': one.margin,
         'required_margin': one.required, 'kept': not one.is_missed,
+        'damping_shares': None if one.split is None else one.split.shares(0),
     }
 
 

@@ -17,7 +17,8 @@ from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
 from rotorsoil_ros.case.summary import band_contents, model_error
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, HOUSING
-from rotorsoil_ros.errors import InputError, NotSolvedError
+from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
+from rotorsoil_ros.machine.damping import DampingSplit
 from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 
@@ -58,10 +59,20 @@ def design_report(machine: 'Machine', rpm: float) -> DesignReport:
     found = findings(case, growth, housings, modes, moved)
     return DesignReport(
         case=case, speed=speed, verdict=verdict_of(found), reasons=found.in_order,
-        stable=found.stable, housings=housings, modes=modes, influences=moved,
+        stable=found.stable, housings=housings, modes=modes,
+        damping=_damping(machine, rpm), influences=moved,
         next_step=next_step(machine, found, housings, modes, moved),
         assumptions=tuple(_assumptions(case)), not_modelled=tuple(_not_modelled(case)),
         guesses=tuple(_guesses(case)))
+
+
+def _damping(machine: 'Machine', rpm: float) -> DampingSplit | None:
+    """Return where the energy of the unbalance goes, where there is a steady answer to it."""
+    try:
+        found = machine.damping_split(rpm=rpm)
+    except RotorSoilError:  # a resonance without damping has no number
+        return None
+    return found if found.total[0] > 0.0 else None
 
 
 def _growth(machine: 'Machine', speed: float) -> Stability:

@@ -1,0 +1,228 @@
+"""Where the damping comes from: bearings, pedestals, material of the soil, radiation into it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+import math
+
+import numpy as np
+
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
+from rotorsoil_ros.ground.neighbours import without_loss
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.critical import CriticalSpeed
+from rotorsoil_ros.machine.support import Support
+from rotorsoil_ros.units import RADIANS_PER_TURN
+
+BEARINGS, PEDESTALS, RADIATION, MATERIAL, SOIL = (
+    'bearings', 'pedestals', 'radiation', 'soil material', 'soil')
+DAMPERS = (BEARINGS, PEDESTALS, RADIATION, MATERIAL, SOIL)
+
+# Above, a mode hardly swings before it is gone, and shares of its decay mean nothing.
+LARGEST_DAMPING_RATIO = 0.7
+
+
+@dataclass(frozen=True)
+class DampingSplit:
+    """
+    Work that each part takes out of a vibration, over n speeds or modes.
+
+    Attributes
+    ----------
+    speed : (n,) float array
+        Of the rotor [rad/s].
+    parts : tuple of (str, str)
+        What takes it, one of the words of this room, and the name of the bearing or block.
+    work : (n, k) float array
+        Of each part [J] per cycle; of a mode in proportion only. Negative where it feeds.
+
+    """
+
+    speed: FloatArray
+    parts: tuple[tuple[str, str], ...]
+    work: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """All of it, (n,): what the unbalance puts in [J] per cycle."""
+        return np.asarray(self.work.sum(axis=1))
+
+    @property
+    def power(self) -> FloatArray:
+        """All of it over time, (n,) [W]."""
+        return self.total * self.speed / RADIANS_PER_TURN
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What there is, in the order of the words of this room."""
+        there = {kind for kind, _ in self.parts}
+        return tuple(kind for kind in DAMPERS if kind in there)
+
+    def share(self, kind: str, name: str | None = None) -> FloatArray:
+        """Return the share of a kind, or of one of its parts, (n,) [-]; NaN where all is none."""
+        own = [index for index, part in enumerate(self.parts)
+               if part[0] == kind and name in (None, part[1])]
+        with np.errstate(invalid='ignore', divide='ignore'):
+            return np.asarray(self.work[:, own].sum(axis=1) / self.total)
+
+    def where(self, holds: BoolArray) -> 'DampingSplit':
+        """Return the same with NaN where it does not hold, (n,) bool."""
+        return replace(self, work=np.where(holds[:, None], self.work, math.nan))
+
+    def shares(self, row: int) -> dict[str, float | None]:
+        """Return the share of every kind at one speed or mode; None where all is none."""
+        found = {kind: float(self.share(kind)[row]) for kind in self.kinds}
+        return {kind: share if math.isfinite(share) else None for kind, share in found.items()}
+
+    def words(self, row: int) -> str:
+        """Return how the damping of one speed or mode is divided, the largest share first."""
+        shares = sorted(((float(self.share(kind)[row]), kind) for kind in self.kinds),
+                        reverse=True)
+        if not all(math.isfinite(share) for share, _ in shares):
+            return 'none'
+        return ', '.join(f'{kind} {share:.1%}' for share, kind in shares)
+
+
+@dataclass(frozen=True)
+class DampingSplitter:
+    """
+    Divides the damping of a machine.
+
+    Attributes
+    ----------
+    model : CoupledModel
+        The machine.
+
+    Notes
+    -----
+    A force F on a motion u takes pi Im(u^H F) in a cycle. Radiation is what the soil would take
+    at the same motion if its material lost nothing; the material takes the rest. Of a mode
+    exp(i w t) the same sums, with dynamic stiffnesses at its own complex frequency, are the parts
+    of its decay: the imaginary part of phi^H times the equation of motion. The force into the
+    soil follows by equilibrium, so that no compliance is inverted for it.
+
+    References
+    ----------
+    Theory manual, where the damping comes from.
+
+    """
+
+    model: CoupledModel
+
+    @cached_property
+    def _lossless(self) -> Support | None:
+        """The same support on soil that loses nothing; None where no model knows of one."""
+        support = self.model.support
+        twins = [without_loss(model, block.contact) for model, block
+                 in zip(support.soil_models, support.foundations, strict=False)]
+        if not twins or any(twin is None for twin in twins):
+            return None
+        return replace(support, soil_models=tuple(twin for twin in twins if twin is not None))
+
+    @cached_property
+    def parts(self) -> tuple[tuple[str, str], ...]:
+        """What may take energy, in the order of its columns."""
+        bearings = self.model.rotor.bearings
+        soil = (SOIL,) if self._lossless is None else (RADIATION, MATERIAL)
+        return (*((BEARINGS, bearing.name) for bearing in bearings),
+                *((PEDESTALS, bearing.name) for bearing in bearings
+                  if bearing.pedestal is not None),
+                *((kind, block.name) for kind in soil for block in self.model.foundations))
+
+    def forced(self, speed: FloatArray, unbalance: ComplexArray) -> DampingSplit:
+        """
+        Divide what the unbalance puts in, exactly at every speed.
+
+        Parameters
+        ----------
+        speed : (n,) float array
+            Rotor speeds [rad/s].
+        unbalance : (p,) complex array
+            As `CoupledModel.unbalance_response`.
+
+        """
+        model, support = self.model, self.model.support
+        found = model.unbalance_response(speed, unbalance)
+        seats = 4 * len(model.rotor.bearings)
+        pairs = (len(speed), len(model.rotor.bearings), 2, 2)
+        journal, housing = np.moveaxis(found.displacement[:, :seats].reshape(pairs), 2, 0)
+        through = found.force[:, :seats].reshape(pairs)[:, :, 0]
+        blocks = slice(len(model.channels) - 6 * len(model.foundations), None)
+        motion, into_soil = found.displacement[:, blocks], found.force[:, blocks]
+        flat = (len(speed), 2 * len(model.rotor.bearings))
+        seat = motion @ support.block_rows.T
+        deflection = (housing.reshape(flat) - seat)[:, support.pedestal_axes]
+        inertia = speed[:, None] ** 2 * (housing.reshape(flat) @ support.housing_mass)
+        below = (through.reshape(flat) + inertia)[:, support.pedestal_axes]
+        radiated = None if self._lossless is None else _pushed(
+            self._lossless.ground(speed), motion)
+        return DampingSplit(speed, self.parts, math.pi * self._taken(
+            journal - housing, through, deflection, below, motion, into_soil, radiated))
+
+    def of_modes(self, criticals: Sequence[CriticalSpeed]) -> list[DampingSplit | None]:
+        """Divide the decay of the mode at every critical speed; None where it hardly swings."""
+        swinging = [one for one in criticals
+                    if abs(one.damping_ratio) <= LARGEST_DAMPING_RATIO]
+        if not swinging:
+            return [None] * len(criticals)
+        highest = 1.2 * max(one.speed for one in swinging)
+        span = self.model.support.known(highest)
+        continued = None if self._lossless is None else self._lossless.continued(span)
+        blocks = 6 * len(self.model.foundations)
+        found: list[DampingSplit | None] = []
+        for one in criticals:
+            if abs(one.damping_ratio) > LARGEST_DAMPING_RATIO:
+                found.append(None)
+                continue
+            w = one.speed * (1.0 + 1j * one.damping_ratio / math.sqrt(
+                1.0 - one.damping_ratio**2))
+            compliance = None
+            if continued is not None:
+                size = continued.size[:blocks]
+                compliance = (size[:, None] * size
+                              * continued(np.array([w]))[:, :blocks, :blocks])
+            found.append(self._of_mode(one, w, compliance))
+        return found
+
+    def _of_mode(
+        self, critical: CriticalSpeed, w: complex, lossless: ComplexArray | None,
+    ) -> DampingSplit:
+        model, support = self.model, self.model.support
+        speed, blocks = np.array([critical.speed]), 6 * len(model.foundations)
+        nodes = [model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
+        pairs = (1, len(nodes), 2)
+        gap = critical.deflection[nodes].ravel() - support.motion_rows @ critical.support
+        stiffness, damping = model.bearing_coefficients(speed)
+        through = (stiffness[0] + 1j * w * damping[0]) @ gap
+        below = (support.motion_rows.T @ through
+                 + w**2 * (support.motion_mass @ critical.support))[None]
+        motion = critical.support[None, :blocks]
+        radiated = None if lossless is None else _pushed(lossless, motion)
+        return DampingSplit(speed, self.parts, self._taken(
+            gap.reshape(pairs), through.reshape(pairs), critical.support[None, blocks:],
+            below[:, blocks:], motion, below[:, :blocks], radiated))
+
+    def _taken(
+        self, gap: ComplexArray, through: ComplexArray, deflection: ComplexArray,
+        below: ComplexArray, motion: ComplexArray, into_soil: ComplexArray,
+        radiated: ComplexArray | None,
+    ) -> FloatArray:
+        """Return Im(u^H F) of every part, (n, k)."""
+        rows = len(gap)
+        films = (gap.conj() * through).imag.sum(axis=2)
+        springs = (deflection.conj() * below).imag.reshape(rows, -1, 2).sum(axis=2)
+        soil = (motion.conj() * into_soil).imag.reshape(rows, -1, 6).sum(axis=2)
+        if radiated is None:
+            return np.concatenate([films, springs, soil], axis=1)
+        waves = (motion.conj() * radiated).imag.reshape(rows, -1, 6).sum(axis=2)
+        return np.concatenate([films, springs, waves, soil - waves], axis=1)
+
+
+def _pushed(compliance: ComplexArray, motion: ComplexArray) -> ComplexArray:
+    """Return the force of blocks that move on ground of a compliance, (n, 6 f)."""
+    # Rigid ground is a compliance of zero: what cannot move takes no work.
+    free = np.flatnonzero(compliance.diagonal(axis1=1, axis2=2).any(axis=0))
+    force = np.zeros(motion.shape, dtype=complex)
+    force[:, free] = np.linalg.solve(
+        compliance[:, free[:, None], free], motion[:, free, None])[..., 0]
+    return force
