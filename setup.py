@@ -48,6 +48,7 @@ setup(
     extras_require={
         # ROSS brings plotly of another age along: an environment of its own is the best place.
         'bench': ['plotly<6', 'ross-rotordynamics>=2.3'],
+        'cluster': ['distributed>=2024.1'],
         'docs': [
             'furo>=2024.8.6',
             'myst-parser>=4.0',
@@ -65,6 +66,7 @@ setup(
         'viewer': ['rerun-sdk>=0.38'],
         'test': [
             'cyclonedds>=11.0; sys_platform == "linux" and platform_machine == "x86_64"',
+            'distributed>=2024.1',
             'hypothesis>=6.100',
             'mypy>=1.10',
             'openpyxl>=3.1.0',

@@ -23,6 +23,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rotorsoil_ros.bags.archive import predict_many, Record
     from rotorsoil_ros.bags.comparison import compare, Wish
     from rotorsoil_ros.bags.profile import read_profile
     from rotorsoil_ros.bags.tables.exported import export_log
@@ -67,25 +68,26 @@ __all__ = [
     'Embedment', 'Foundation', 'ImportedTable', 'InfiniteElementModel', 'InputError',
     'JournalBearing', 'JournalStates', 'Layer', 'LayeredSoil', 'Machine', 'Matching', 'Material',
     'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction',
-    'Predictor', 'Probe', 'Profile', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil',
-    'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel', 'SoilSpread',
-    'SpeedSource', 'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
-    'import_table', 'load', 'read_profile',
+    'Predictor', 'Probe', 'Profile', 'Record', 'Rectangle', 'Response', 'ResponseTable',
+    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel',
+    'SoilSpread', 'SpeedSource', 'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish', 'compare',
+    'export_log', 'import_table', 'load', 'predict_many', 'read_profile',
 ]
 
 # Which room a public name lives in.
 _ROOMS = {
+    'bags.archive': ('Record', 'predict_many'),
     'bags.comparison': ('Wish', 'compare'),
     'bags.profile': ('read_profile',),
-    'case.design.report': ('DesignReport',),
     'bags.tables.exported': ('export_log',),
     'bags.tables.imported': ('ImportedTable', 'import_table'),
+    'case.design.report': ('DesignReport',),
     'case.machine': ('Machine', 'load'),
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
     'events': ('Profile',),
-    'ground.boundary.site': ('Site',),
     'ground.boundary.model': ('BoundaryElementModel',),
+    'ground.boundary.site': ('Site',),
     'ground.cone': ('ConeModel',),
     'ground.half_space': ('InfiniteElementModel',),
     'ground.layers.model': ('ThinLayerModel',),

@@ -9,7 +9,7 @@ from pathlib import Path
 import sys
 import warnings
 
-from rotorsoil_ros.cli.parser import parse
+from rotorsoil_ros.cli.arguments.parser import parse
 from rotorsoil_ros.errors import BAD_INPUT, InputError, RotorSoilError
 
 INTERRUPTED = 130

@@ -7,8 +7,10 @@ import sys
 from typing import TYPE_CHECKING
 
 from rotorsoil_ros.case import config, document, ross
+from rotorsoil_ros.cli.archive import is_archive, predict_archive
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.table import opened
+from rotorsoil_ros.errors import InputError
 
 if TYPE_CHECKING:
     from rotorsoil_ros.wire.speeds import SpeedSource
@@ -31,14 +33,19 @@ def predict(arguments: Namespace) -> int:
 
     machine = Machine.load(
         arguments.case, cache_directory=arguments.cache, overrides=arguments.overrides)
+    if is_archive(arguments):
+        return predict_archive(arguments, machine, speed_source(arguments))
+    if arguments.output is None:
+        raise InputError('-o OUT is missing: the log to write')
+    [profile] = arguments.profiles
     with progress('predicting') as report:
-        answered = answer(machine, arguments.profile, arguments.output, progress=report,
+        answered = answer(machine, profile, arguments.output, progress=report,
                           speed=speed_source(arguments),
                           screen=arguments.rrd and recorder(arguments.rrd, machine))
     for remark in answered.remarks:
         print(remark, file=sys.stderr)
     if answered.failure:
-        print(f'{arguments.profile}: {answered.failure}', file=sys.stderr)
+        print(f'{profile}: {answered.failure}', file=sys.stderr)
         return 1
     counts = ', '.join(f'{number} {reason}' for reason, number in answered.counts.items())
     print(f'{arguments.output}: {answered.machine}: {counts}')

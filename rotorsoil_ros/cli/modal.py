@@ -7,7 +7,7 @@ import sys
 from rotorsoil_ros.case.design.margins import separation_margins
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.summary import clipped, stability_doubts, unstable
-from rotorsoil_ros.cli.parser import PLANT
+from rotorsoil_ros.cli.arguments.options import PLANT
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table

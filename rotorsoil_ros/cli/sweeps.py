@@ -10,7 +10,7 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import DOFS
-from rotorsoil_ros.cli.parser import PLANT, Sweep
+from rotorsoil_ros.cli.arguments.options import PLANT, Sweep
 from rotorsoil_ros.cli.table import (
     complex_columns,
     complex_names,

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.cli.parser import PLANT, SI
+from rotorsoil_ros.cli.arguments.options import PLANT, SI
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.prediction import Response
 

@@ -1,6 +1,6 @@
 """In which zone a housing vibrates, by the model's class of its support. Nothing chatters."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 import math
 
@@ -86,6 +86,8 @@ class Zones:
         self._limits = limits
         self._channels = frozenset(channels)
         self.natural: Mapping[str, float] = {}
+        # Who is told the zone of every housing in every second of the run.
+        self.listener: Callable[[int, HousingZone], None] = _nobody
         self._open: dict[Channel, _Second] = {}
         self._worst: dict[tuple[Channel, str], HousingZone] = {}
         self.predicted: dict[Channel, HousingState] = {}
@@ -144,6 +146,7 @@ class Zones:
             limits = self._limits.of(support, abs(speed))
             found = HousingZone(channel, source, speed, velocity, zone(velocity, limits), support,
                                 limits, is_steady)
+            self.listener(second.second, found)
             before = self._worst.get((channel, source))
             if before is None or found.badness > before.badness:
                 self._worst[channel, source] = found
@@ -160,6 +163,10 @@ class Zones:
         state.support = support
         state.zone = held_zone(before, velocity, self._limits.of(support, abs(speed)),
                                hysteresis=HYSTERESIS)
+
+
+def _nobody(second: int, found: HousingZone) -> None:
+    """Listen to nothing."""
 
 
 def worst_state(states: Mapping[Channel, HousingState]) -> tuple[Channel, HousingState] | None:

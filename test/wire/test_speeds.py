@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
-from rotorsoil_ros.cli.parser import _SPEED_UNITS
+from rotorsoil_ros.cli.arguments.options import UNITS_OF_SPEED
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.units import SPEED_UNITS
 from rotorsoil_ros.wire.cdr import encode
@@ -96,7 +96,7 @@ def test_units_are_those_of_a_plant(unit, value, turns_per_second):
 
 
 def test_the_command_line_offers_every_unit():
-    assert tuple(SPEED_UNITS) == _SPEED_UNITS
+    assert tuple(SPEED_UNITS) == UNITS_OF_SPEED
 
 
 @pytest.mark.parametrize('kind, values, field, wanted', [

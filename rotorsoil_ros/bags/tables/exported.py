@@ -2,17 +2,16 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-import csv
 from dataclasses import dataclass, field
 import math
-import os
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import place
+from rotorsoil_ros.bags.tables.files import opened, require_suffix, Value
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
@@ -22,7 +21,6 @@ from rotorsoil_ros.wire.handlers import SPEED_TOPICS
 from rotorsoil_ros.wire.messages import NODE_NAME, OWN_TOPICS, Records
 from rotorsoil_ros.wire.speeds import SpeedReader, USUAL
 
-Value = float | int | str
 Progress = Callable[[int, int], None]
 
 # Columns of amplitudes: those of a displacement in m, those of a rotation in rad.
@@ -41,19 +39,6 @@ TOLD_BY = {'amplitude': 'predicted', 'phase': 'predicted_phase', 'amplitude_low'
 SETTLED_NS = 5 * NANOSECONDS  # after which nothing of a stamp comes any more
 MESSAGES_AT_ONCE = 512
 ROWS_AT_ONCE = 50_000
-
-
-Writes = Callable[[Sequence[Mapping[str, Value]]], object]
-
-
-class TableFile(Protocol):
-    """A table that is being written."""
-
-    def __enter__(self) -> Writes:
-        """Begin it; return what takes its rows."""
-
-    def __exit__(self, *raised: object) -> None:
-        """Finish it."""
 
 
 def export_log(
@@ -85,10 +70,7 @@ def export_log(
 
     """
     log, out = Path(log), Path(out)
-    writers: dict[str, Callable[[Path], TableFile]] = {
-        '.csv': _CsvFile, '.parquet': _ParquetFile}
-    if out.suffix not in writers:
-        raise InputError(f'{out}: must end with {" or ".join(writers)}')
+    require_suffix(out)
     sources = bag_reader.sources(log)
     wanted = {source.topic: found for source in sources
               if source.encoding == bag_reader.CDR
@@ -98,27 +80,23 @@ def export_log(
         raise InputError(f'{log}: tells nothing of {machine or "any machine"} that was predicted '
                          'or measured')
     total = sum(number for source, number in sources.items() if source.topic in wanted)
-    partial, count, done = out.with_name(f'{out.name}.partial'), 0, 0
-    try:
-        with writers[out.suffix](partial) as write:
-            rows: list[Mapping[str, Value]] = []
-            tables = _Tables(wanted)
-            for batch in bag_reader.batches(
-                    log, lambda topic, kind: topic in wanted or kind == DIAGNOSTICS,
-                    at_most=MESSAGES_AT_ONCE, span_ns=NANOSECONDS):
-                rows += tables.take(batch)
-                done += len(batch.payloads)
-                if progress:
-                    progress(min(done, total), total)
-                if len(rows) >= ROWS_AT_ONCE:
-                    write(rows)
-                    count, rows = count + len(rows), []
-            rows += tables.rest()
-            write(rows)
-            count += len(rows)
-        os.replace(partial, out)
-    finally:
-        partial.unlink(missing_ok=True)
+    count = done = 0
+    with opened(out, COLUMNS) as write:
+        rows: list[Mapping[str, Value]] = []
+        tables = _Tables(wanted)
+        for batch in bag_reader.batches(
+                log, lambda topic, kind: topic in wanted or kind == DIAGNOSTICS,
+                at_most=MESSAGES_AT_ONCE, span_ns=NANOSECONDS):
+            rows += tables.take(batch)
+            done += len(batch.payloads)
+            if progress:
+                progress(min(done, total), total)
+            if len(rows) >= ROWS_AT_ONCE:
+                write(rows)
+                count, rows = count + len(rows), []
+        rows += tables.rest()
+        write(rows)
+        count += len(rows)
     return count
 
 
@@ -254,47 +232,3 @@ class _Tables:
                 if name in self._machines:
                     self._machines[name].zones[text] = texts[
                         f'{path.removesuffix(".key")}.value'][0]
-
-
-class _CsvFile:
-    """Writes rows as CSV; what is not known is an empty cell."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> Writes:
-        self._stream = self._path.open('w', encoding='utf-8', newline='')
-        writer = csv.DictWriter(self._stream, COLUMNS, restval='', lineterminator='\n')
-        writer.writeheader()
-        return lambda rows: writer.writerows({
-            name: '' if value != value else value for name, value in row.items()}
-            for row in rows)
-
-    def __exit__(self, *raised: object) -> None:
-        self._stream.close()
-
-
-class _ParquetFile:
-    """Writes rows as parquet; what is not known is null."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            import pyarrow
-            import pyarrow.parquet
-        except ImportError as error:
-            raise InputError(f'{path.with_suffix("")}: needs pyarrow: pip install '
-                             '"rotorsoil_ros[tables]"; or write .csv') from error
-        kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64()}
-        self._arrow = pyarrow
-        self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
-        self._path = path
-
-    def __enter__(self) -> Writes:
-        self._file = self._arrow.parquet.ParquetWriter(self._path, self._schema)
-        return lambda rows: self._file.write_table(self._arrow.table({
-            name: [None if value != value else value
-                   for value in (row.get(name, math.nan) for row in rows)]
-            for name in COLUMNS}, schema=self._schema))
-
-    def __exit__(self, *raised: object) -> None:
-        self._file.close()

@@ -3,7 +3,7 @@
 import argparse
 from argparse import Namespace
 
-from rotorsoil_ros.cli.parser import parser
+from rotorsoil_ros.cli.arguments.parser import parser
 
 _BASH = """\
 _rotorsoil() {{

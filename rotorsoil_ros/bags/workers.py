@@ -1,0 +1,96 @@
+"""Who answers many bags at once: processes of this machine, or those of a cluster."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import Any
+
+from rotorsoil_ros.bags.archive import Job, Mapper, Record
+from rotorsoil_ros.errors import InputError
+
+Answers = Callable[[Job], Record]
+
+
+def processes(number: int) -> Mapper:
+    """
+    Return what answers in processes that live until all is done.
+
+    A bag that ends its process (for want of memory, as a rule) costs the others nothing: what
+    was being answered when it happened is answered again, each in a process of its own, and
+    what ends that too has a record that says so.
+    """
+    def answers(function: Answers, jobs: Iterable[Job], /) -> Iterator[Record]:
+        left = list(jobs)
+        while left:
+            with _pool(min(number, len(left))) as pool:
+                futures = [pool.submit(function, job) for job in left]
+                try:
+                    for future in futures:
+                        yield future.result()
+                        del left[0]
+                    return
+                except BrokenProcessPool:
+                    begun = [job for job in left if job.begun.exists()]
+                    if not begun:  # processes end before they begin anything
+                        raise
+            for job in begun:
+                _alone(function, job)
+            while left and (record := left[0].known()) is not None:
+                yield record
+                del left[0]
+
+    return answers
+
+
+def _pool(number: int) -> ProcessPoolExecutor:
+    # A fork of a process that has threads, as numpy's may be, can hang.
+    return ProcessPoolExecutor(number, mp_context=get_context('spawn'))
+
+
+def _alone(function: Answers, job: Job) -> None:
+    """Answer a bag that was begun when a process ended; its record tells what became of it."""
+    try:
+        with _pool(1) as pool:
+            pool.submit(function, job).result()
+    except BrokenProcessPool:
+        job.keep(Record(str(job.bag), failure='its process was ended twice (memory?)'))
+        job.begun.unlink(missing_ok=True)
+
+
+def cluster(address: str) -> Mapper:
+    """
+    Return what answers on the workers of a Dask cluster.
+
+    Parameters
+    ----------
+    address : str
+        Of its scheduler, such as `tcp://10.0.0.1:8786`. Its workers have this package and see
+        bags, output and cache under the same paths.
+
+    Raises
+    ------
+    InputError
+        If distributed is not installed, or nobody answers there.
+
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as error:
+        raise InputError('a cluster needs distributed: pip install rotorsoil_ros[cluster]'
+                         ) from error
+    try:
+        client: Any = Client(address)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InputError(f'{address}: no scheduler of a cluster answers: {error}') from error
+
+    def answers(function: Answers, jobs: Iterable[Job], /) -> Iterator[Record]:
+        given = list(jobs)
+        with client:
+            for job, future in zip(given, client.map(function, given, pure=False), strict=True):
+                try:
+                    yield future.result()
+                except KilledWorker as error:
+                    yield job.keep(Record(str(job.bag), failure=str(error)))
+
+    return answers

@@ -1,0 +1,1 @@
+"""What may stand behind `rotorsoil`, and how a shell completes it."""
