@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-import math
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +14,15 @@ from rotorsoil_ros.case import cache, document, schema, stiffness_file
 from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, message
 from rotorsoil_ros.case.entries.entry import faults
+from rotorsoil_ros.case.entries.ground import GroundEntries, THIN_LAYERS
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
-from rotorsoil_ros.errors import InputError, require, RotorSoilError
+from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import a0_range
+from rotorsoil_ros.ground.layers.model import Proportions
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -43,7 +45,8 @@ class Case:
     path : Path
         The file it came from.
     soil : Soil or None
-        Half-space; None is allowed on a rigid support only.
+        Half-space, or of several layers that below the deepest base; None is allowed on a rigid
+        support or a table only.
     support : schema.SupportEntry
         Which model of the soil, and its geometry.
     foundations : tuple of Foundation
@@ -57,6 +60,10 @@ class Case:
         Discs whose unbalance is also a couple.
     speed_range : tuple of two floats
         Lowest and highest rotor speed [rad/s].
+    ground : LayeredSoil or None
+        Where the support knows layers and embedment, or the file tells them.
+    embedments : tuple of Embedment
+        How deep each block stands in the ground, and how much of its wall is welded.
     tables : tuple of ComplianceTable
         What each block stands on where a file says it; else empty.
     uncertainty : SoilSpread
@@ -85,6 +92,8 @@ class Case:
     unbalance: ComplexArray
     couples: tuple[str, ...]
     speed_range: tuple[float, float]
+    ground: LayeredSoil | None = None
+    embedments: tuple[Embedment, ...] = ()
     tables: tuple[ComplianceTable, ...] = ()
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
@@ -129,6 +138,18 @@ def infinite_range(
         a0_range(soil, contact, geometry, omega_min=lowest, omega_max=_HIGHEST_ORDER * high)
         return lowest, _HIGHEST_ORDER * high
     return lowest, high
+
+
+def proportions(
+    ground: LayeredSoil, contact: Contact, embedment: Embedment,
+    speed_range: tuple[float, float],
+) -> Proportions:
+    """Return what a table of layered ground has to cover for some speeds [rad/s]."""
+    high = speed_range[1]
+    found = Proportions.of(ground, contact, embedment, omega_max=high)
+    with suppress(RotorSoilError):  # at such speeds the running frequency has to do
+        return Proportions.of(ground, contact, embedment, omega_max=_HIGHEST_ORDER * high)
+    return found
 
 
 def load(
@@ -201,15 +222,17 @@ class _Builder:
     def case(self) -> Case:
         """Return the machine, or raise one InputError with all that is wrong with it."""
         faults, entries = self.faults, self.faults.entries
-        soil = faults.attempt(self._soil)
+        on = GroundEntries(faults)
+        ground = faults.attempt(on.ground)
         faults.attempt(faults.refuse_repeated_names)
-        faults.attempt(self._refuse_unfit_support)
+        faults.attempt(self._refuse_unused_files)
+        faults.attempt(on.refuse_unfit_support)
         speed_range = faults.attempt(self._speed_range)
         # A mesh that nobody could solve is not even built.
         rotor = RotorEntries(faults).rotor() if faults.attempt(self._mesh) else None
         if rotor is not None:
             faults.attempt(lambda: self._refuse_bursting_speed(rotor))
-        foundations = BlockEntries(faults).foundations()
+        foundations, embedments = BlockEntries(faults).foundations(), on.embedments(ground)
         unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
         unbalance = unbalances.total()
         tables = None if speed_range is None else faults.attempt(
@@ -221,16 +244,21 @@ class _Builder:
         faults.tell()
         assert rotor is not None
         assert foundations is not None
+        assert embedments is not None
         assert unbalance is not None
         assert speed_range is not None
         assert tables is not None
         assert journals is not None
         assert uncertainty is not None
         assert zones is not None
+        layered = ground if isinstance(ground, LayeredSoil) else None
+        soil = ground.at(max((one.depth for one in embedments), default=0.0)) if (
+            isinstance(ground, LayeredSoil)) else ground
         case = Case(
-            name=entries.name, path=faults.path, soil=soil, support=entries.support,
-            foundations=foundations, rotor=floated(rotor, journals), unbalance=unbalance,
-            couples=unbalances.couples(), speed_range=speed_range, tables=tables,
+            name=entries.name, path=faults.path, soil=soil, ground=layered,
+            embedments=embedments, support=entries.support, foundations=foundations,
+            rotor=floated(rotor, journals), unbalance=unbalance, couples=unbalances.couples(),
+            speed_range=speed_range, tables=tables,
             uncertainty=uncertainty, zones=zones, anti_alias=self.faults.entries.anti_alias,
             journals=journals, cache_directory=self.cache_directory,
             content=self.content, files=self.files)
@@ -275,38 +303,6 @@ class _Builder:
                 f'motions need a table of {needed / _GIB:.3g} GiB, more than '
                 f'{_LARGEST_TABLE / _GIB:g} GiB, got {len(model.rotor.discs)} discs'))
 
-    def _soil(self) -> Soil | None:
-        entry = self.faults.entries.soil
-        if entry is None:
-            return None
-        given = {key: value for key, value in dict(entry).items() if value is not None}
-        velocity = given.pop('shear_wave_velocity', None)
-        if (velocity is None) is (entry.shear_modulus is None):
-            raise self.faults.error(
-                'soil', problem='needs either shear_modulus in Pa or shear_wave_velocity in m/s, '
-                                f'got {"neither" if velocity is None else "both"}')
-        with self.faults.at('soil', entry=entry):
-            if velocity is not None:
-                require(0.0 < velocity < math.inf, 'shear_wave_velocity', '> 0 m/s', velocity)
-                given['shear_modulus'] = entry.density * velocity**2
-            return Soil(**given)
-
-    def _refuse_unfit_support(self) -> None:
-        entries, support = self.faults.entries, self.faults.entries.support
-        self._refuse_unused_files()
-        if support.model == 'rigid':
-            return
-        if entries.soil is None and support.model != 'table':
-            raise self.faults.error('soil', problem='is missing; the support model '
-                                                    f'{support.model} needs it')
-        if support.model in ('cone', 'table') and support.geometry != 'disc':
-            raise self.faults.error(
-                'support', 'geometry', problem=f'must be disc for the model {support.model}, '
-                                               f'got {support.geometry}')
-        if not entries.foundations:
-            raise self.faults.error('foundations', problem='is missing; the support model '
-                                                           f'{support.model} needs a block')
-
     def _refuse_unused_files(self) -> None:
         entries = self.faults.entries
         if entries.support.model == 'table':
@@ -338,6 +334,11 @@ class _Builder:
         return tuple(tables)
 
     def _refuse_unreachable_soil(self, case: Case) -> None:
+        if case.support.model == THIN_LAYERS and case.ground is not None:
+            for index, foundation in enumerate(case.foundations):
+                with self.faults.at('foundations', index):
+                    proportions(case.ground, foundation.contact, case.embedments[index],
+                                case.speed_range)
         if case.support.model != 'infinite_elements' or case.soil is None:
             return
         geometry = case.support.geometry

@@ -8,6 +8,7 @@ from pathlib import Path
 from rotorsoil_ros.background import Child, Children, run_as_child
 from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.case.cache import Cache
+from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.half_space import a0_range
@@ -43,8 +44,12 @@ def load_all(
 
 
 def soil_keys(case: config.Case) -> list[str]:
-    """Return what identifies the tables of infinite elements that a case needs."""
+    """Return what identifies the tables of the ground that a case needs."""
     geometry, soil = case.support.geometry, case.soil
+    if case.support.model == THIN_LAYERS and case.ground is not None:
+        return [models.layers_key(config.proportions(
+            case.ground, block.contact, embedment, case.speed_range))
+            for block, embedment in zip(case.foundations, case.embedments, strict=True)]
     if case.support.model != 'infinite_elements' or soil is None:
         return []
     keys = []

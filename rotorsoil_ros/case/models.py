@@ -11,13 +11,17 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
-from rotorsoil_ros.case.config import Case, infinite_range
-from rotorsoil_ros.case.summary import band_contents, stability_doubts, unstable
+from rotorsoil_ros.case.config import Case, infinite_range, proportions
+from rotorsoil_ros.case.design.ground import band_contents
+from rotorsoil_ros.case.summary import stability_doubts, unstable
 from rotorsoil_ros.errors import InputError, RotorSoilError, solved
 from rotorsoil_ros.ground.accuracy import mapping_error
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import DimensionlessTable, require_kind
 from rotorsoil_ros.ground.half_space import a0_range, ELEMENTS_ALGORITHM, InfiniteElementModel
+from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.layers.table import LayeredTable
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
@@ -83,6 +87,9 @@ def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
     contact = case.foundations[index].contact
     if case.support.model == 'cone':
         return ConeModel(case.soil, contact)
+    if case.ground is not None:
+        return thin_layer_model(case.ground, contact, case.embedments[index], cache=cache,
+                                speed_range=case.speed_range)
     return infinite_element_model(case.soil, contact, case.support.geometry, cache=cache,
                                   speed_range=case.speed_range)
 
@@ -115,6 +122,38 @@ def infinite_element_model(
     return model
 
 
+def thin_layer_model(
+    ground: LayeredSoil, contact: Contact, embedment: Embedment, *, cache: Cache,
+    speed_range: tuple[float, float],
+) -> ThinLayerModel:
+    """
+    Return thin layers, solved unless a ground of these proportions was before.
+
+    Parameters
+    ----------
+    ground, contact, embedment
+        As `ThinLayerModel.solved`.
+    cache : Cache
+        Where dimensionless tables lie.
+    speed_range : tuple of two floats
+        Rotor speeds to be covered [rad/s].
+
+    """
+    scaled = proportions(ground, contact, embedment, speed_range)
+    key = layers_key(scaled)
+    stored = cache.load('compliance', key)
+    if stored is not None:
+        return ThinLayerModel(ground, contact, LayeredTable.from_arrays(stored), embedment)
+    table = scaled.table()
+    cache.store('compliance', key, table.to_arrays())
+    return ThinLayerModel(ground, contact, table, embedment)
+
+
+def layers_key(scaled: Proportions) -> str:
+    """Return what identifies a table of layered ground: ratios of stiffness, density and size."""
+    return content_key('layers', LAYERS_ALGORITHM, scaled)
+
+
 def compliance_key(soil: Soil, geometry: str, a0_min: float, a0_max: float) -> str:
     """Return what identifies a dimensionless table: neither G, nor density, nor size."""
     return content_key('compliance', ELEMENTS_ALGORITHM, geometry, soil.poisson_ratio,
@@ -137,6 +176,9 @@ def key_of(model: InfiniteElementModel) -> str:
 def _identity(model: SoilModel) -> object:
     if isinstance(model, InfiniteElementModel):
         return ['infinite', model.soil, model.contact, key_of(model)]
+    if isinstance(model, ThinLayerModel):
+        return ['layers', LAYERS_ALGORITHM, model.ground, model.contact, model.embedment,
+                float(model.table.edges[-1])]
     if isinstance(model, ComplianceTable):
         return ['table', model.omega, model.values]
     return model

@@ -6,6 +6,7 @@ import numpy as np
 
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.journal_entries import Journal
+from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
 from rotorsoil_ros.rotor.bearing import SpeedTable
 from rotorsoil_ros.rotor.shaft import Material
@@ -24,6 +25,7 @@ _VISCOSITY = 2e-4, 2.0, 'Pa s', (1e-3,)
 # Of a block: its mass over that of the rotor, its density, its inertia over that of a plate.
 _LEAST_MASS_RATIO = 0.1
 _BLOCK_DENSITY = 300.0, 9000.0
+_HEAVIEST_CONCRETE = 2600.0
 _LEAST_INERTIA, _LARGEST_INERTIA = 0.2, 50.0
 
 # Eccentricity of an unbalance that is no longer one, of the rotor as a whole [m].
@@ -32,19 +34,32 @@ _LARGEST_ECCENTRICITY = 2e-2
 
 def slips(case: Case) -> Iterator[str]:
     """Yield a question for every number that is outside what such a thing ever has."""
-    if case.soil is not None:
-        yield from asked('soil.density', case.soil.density, _SOIL_DENSITY)
-        yield from asked('soil.shear_modulus', case.soil.shear_modulus, _SOIL_MODULUS)
+    for place, soil in _soils(case):
+        yield from asked(f'{place}.density', soil.density, _SOIL_DENSITY)
+        yield from asked(f'{place}.shear_modulus', soil.shear_modulus, _SOIL_MODULUS)
     yield from _of_shaft(case)
     yield from _of_bearings(case)
     for index, block in enumerate(case.foundations):
         yield from _of_block(case, f'foundations.{index}', block)
+        yield from _of_hole(case, index, block)
     total = float(abs(np.sum(case.unbalance[:len(case.rotor.discs)])))
     if total > _LARGEST_ECCENTRICITY * case.rotor.mass:
         yield (f'unbalances: {total:g} kg m shift the centre of the rotor of '
                f'{case.rotor.mass:.4g} kg by {1e3 * total / case.rotor.mass:.3g} mm; a moment is '
                f'in kg m: did you mean {_number(1e-3 * total)} (given in kg mm) or '
                f'{_number(1e-6 * total)} (in g mm)?')
+
+
+def _soils(case: Case) -> Iterator[tuple[str, Soil]]:
+    """Yield every soil of a case and the key at which it stands."""
+    if case.ground is None or not case.ground.layers:
+        if case.soil is not None:
+            yield 'soil', case.soil
+        return
+    for index, layer in enumerate(case.ground.layers):
+        yield f'soil.layers.{index}', layer.soil
+    if case.ground.below is not None:
+        yield 'soil.below', case.ground.below
 
 
 def asked(
@@ -133,6 +148,23 @@ def _of_block(case: Case, place: str, block: Foundation) -> Iterator[str]:
         yield (f'rotor.shaft_height: {_number(case.rotor.shaft_height)} m is not above the top of '
                f'{block.name}, {_number(block.height)} m; it counts from the contact: did you '
                f'mean {_number(case.rotor.shaft_height + block.height)}?')
+
+
+def _of_hole(case: Case, index: int, block: Foundation) -> Iterator[str]:
+    """Ask about a block that is buried, or that seems to weigh its excavated soil too."""
+    depth = case.embedments[index].depth
+    if not depth or block.height is None or case.soil is None:
+        return
+    place = f'foundations.{index}'
+    if depth > block.height:
+        yield (f'{place}.embedment: {_number(depth)} m is more than the height of {block.name}, '
+               f'{_number(block.height)} m: its top lies below the surface')
+    soil = case.soil.density * block.contact.area * depth
+    solid = _HEAVIEST_CONCRETE * block.contact.area * block.height
+    if block.mass > solid and block.mass - soil < solid:
+        yield (f'{place}.mass: {_number(block.mass)} kg are more than concrete of its size has, '
+               f'{_number(solid)} kg; the {_number(soil)} kg of soil that it displaces must not '
+               f'be part of it: did you mean {_number(block.mass - soil)}?')
 
 
 def _of_inertia(place: str, block: Foundation) -> Iterator[str]:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import Discriminator, Field, StrictBool, StringConstraints, Tag
 
 from rotorsoil_ros.case.entries.bearing import BearingEntry
-from rotorsoil_ros.case.entries.entry import Entry, KEYS, WORD
+from rotorsoil_ros.case.entries.entry import Entry, EVEN, KEYS, LAYERED, WORD
 from rotorsoil_ros.case.quantities import (
     BalanceGrade,
     Count,
@@ -35,10 +35,40 @@ class SoilEntry(Entry):
     loss_factor: Ratio
 
 
+def _given_or_named(value: object) -> str:
+    return WORD if isinstance(value, str) else KEYS
+
+
+class LayerEntry(SoilEntry):
+    """Layer of the ground."""
+
+    thickness: Metre
+
+
+class LayersEntry(Entry):
+    """Ground in layers, from the surface down, and what lies below them."""
+
+    layers: list[LayerEntry]
+    below: Annotated[
+        Annotated[SoilEntry, Tag(KEYS)] | Annotated[Literal['rock'], Tag(WORD)],
+        Discriminator(_given_or_named)]
+
+
+def _in_layers(value: object) -> str:
+    is_layered = isinstance(value, LayersEntry) or (
+        isinstance(value, dict) and bool({'layers', 'below'} & set(value)))
+    return LAYERED if is_layered else EVEN
+
+
+AnySoil: TypeAlias = Annotated[
+    Annotated[SoilEntry, Tag(EVEN)] | Annotated[LayersEntry, Tag(LAYERED)],
+    Discriminator(_in_layers)]
+
+
 class SupportEntry(Entry):
     """Which model of the soil stands below the blocks."""
 
-    model: Literal['rigid', 'cone', 'infinite_elements', 'table']
+    model: Literal['rigid', 'cone', 'infinite_elements', 'thin_layers', 'table']
     geometry: Literal['disc', 'plane_strain', 'plane_stress'] = 'disc'
     file: FileName | None = None
 
@@ -56,6 +86,8 @@ class FoundationEntry(Entry):
     inertia: tuple[KilogramSquareMetre, KilogramSquareMetre, KilogramSquareMetre] | None = None
     height: Metre | None = None
     density: KilogramPerCubicMetre | None = None
+    embedment: Metre = 0.0
+    side_contact: Ratio | None = None
     stiffness_file: FileName | None = None
 
 
@@ -65,10 +97,6 @@ class MaterialEntry(Entry):
     young_modulus: Pascal
     poisson_ratio: Ratio
     density: KilogramPerCubicMetre
-
-
-def _given_or_named(value: object) -> str:
-    return WORD if isinstance(value, str) else KEYS
 
 
 AnyMaterial: TypeAlias = Annotated[
@@ -174,7 +202,7 @@ class Document(Entry):
     """The whole file."""
 
     name: Name
-    soil: SoilEntry | None = None
+    soil: AnySoil | None = None
     support: SupportEntry
     foundations: list[FoundationEntry] = Field(default_factory=list)
     rotor: RotorEntry

@@ -8,20 +8,18 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.design.inputs import INPUTS
+from rotorsoil_ros.case.design.ground import band_contents, layers_told, model_error
 from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.accuracy import (
-    CONE_ERROR,
     gap,
     mapping_error,
     neglected_coupling,
     side_ratio,
 )
-from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
-from rotorsoil_ros.ground.soil import equivalent_radii, Rectangle, Soil, SoilModel
+from rotorsoil_ros.ground.soil import equivalent_radii, singular_of, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.rotor.bearing import SpeedTable
@@ -34,9 +32,6 @@ _LARGEST_A0 = 6.0
 _LARGEST_A0_INCOMPRESSIBLE = 2.0
 _LARGEST_ASPECT = 2.0
 _LARGEST_POISSON_RATIO = 0.45
-
-# Told together, as G, nu and eta of the soil.
-_SOIL = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor')
 
 # A film: load over length times diameter [Pa], Reynolds numbers above which it has vortices (times
 # the root of radius over clearance) and is turbulent, eccentricity below which it is about to
@@ -66,6 +61,7 @@ def derived_quantities(
     if case.soil is not None:
         yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
         yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
+    yield from layers_told(case)
     for foundation, model in zip(case.foundations, soil_models, strict=True):
         yield from _of_foundation(case, foundation, model)
         told = model_error(case, foundation)
@@ -88,6 +84,11 @@ def _of_foundation(
             f'{foundation.mass / (case.soil.density * radius**3):.4g}')
         low, high = (a0(case.soil, foundation, speed) for speed in case.speed_range)
         yield f'{name}: a0', f'{low:.3g} to {high:.3g}'
+    singular = singular_of(model)
+    if singular.size:
+        yield f'{name}: waves of the layers begin', (
+            'at ' + ', '.join(f'{rad_s_to_hz(one):.4g}' for one in singular.tolist())
+            + ' Hz; below the first nothing is radiated')
     # A strip gives way without bound at rest, and a file may not know rest: theirs is told where
     # the machine starts.
     where, omega = 'static', 0.0
@@ -131,42 +132,6 @@ def _of_journal(case: Case, journal: Journal) -> Iterator[tuple[str, str]]:
             if threshold < math.inf else
             f'whirls nowhere up to {rad_s_to_rpm(float(journal.states.speed[-1])):.5g} rpm '
             '(textbook)')
-
-
-def model_error(case: Case, foundation: Foundation) -> str:
-    """Return how far the model of the ground under a block may be off; empty if it has none."""
-    if case.support.model not in ('cone', 'infinite_elements') or case.support.geometry != 'disc':
-        return ''
-    parts = []
-    if case.support.model == 'cone':
-        parts.append(f'cones under a disc: stiffness within {CONE_ERROR:.0%}')
-    if isinstance(foundation.contact, Rectangle):
-        share, ratio = mapping_error(foundation.contact), side_ratio(foundation.contact)
-        off = f'up to {share:.0%}' if share < math.inf else 'more than 37%'
-        parts.append(f'discs for a rectangle of {ratio:.3g} to 1: stiffness off by {off}')
-    return '; '.join(parts) or 'infinite elements of a disc: within 0.5%'
-
-
-def band_contents(case: Case) -> str:
-    """Return what the edges of the band of a case hold; empty if it has none."""
-    spread, knows_soil = case.uncertainty, (
-        case.soil is not None and case.support.model in ('cone', 'infinite_elements'))
-    parts = [f'{INPUTS[name].words} (within a factor {getattr(spread, name):g})'
-             for name in spread.inputs(with_soil=knows_soil) if name not in _SOIL]
-    if case.soil is None or not knows_soil:
-        return '; '.join(parts)
-    parts.insert(0, f'soil (G within a factor {spread.shear_modulus_factor:g}, nu within '
-                    f'{spread.poisson_ratio:g}, eta within {spread.loss_factor:g})')
-    if not spread.model_form or case.support.geometry != 'disc':
-        return '; '.join([*parts, 'not the error of the models'])
-    if case.support.model == 'cone':
-        known = case.soil.poisson_ratio <= LARGEST_POISSON_RATIO
-        parts.append('cones against infinite elements' if known else
-                     'not cones against infinite elements, which end at nu = '
-                     f'{LARGEST_POISSON_RATIO:g}')
-    if any(isinstance(block.contact, Rectangle) for block in case.foundations):
-        parts.append('discs against rectangles')
-    return '; '.join(parts)
 
 
 def _of_neighbours(case: Case) -> Iterator[str]:
@@ -343,7 +308,8 @@ def implausible(
 def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:
     if case.support.model == 'cone':
         yield from _of_cones(soil, foundation, speed_range=case.speed_range)
-    elif soil.poisson_ratio > _LARGEST_POISSON_RATIO:
+    elif (case.support.model == 'infinite_elements'
+          and soil.poisson_ratio > _LARGEST_POISSON_RATIO):
         yield (f'soil: nu is {soil.poisson_ratio:g}; above {_LARGEST_POISSON_RATIO:g} infinite '
                'elements are within 0.5 % only up to a0 = 6')
     if case.support.geometry != 'disc':

@@ -12,7 +12,7 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import units_of, write_table
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter, DAMPERS
+from rotorsoil_ros.machine.damping import DAMPERS, DampingSplit, DampingSplitter
 from rotorsoil_ros.machine.modes.critical import asked
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
 

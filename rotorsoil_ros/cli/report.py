@@ -10,13 +10,13 @@ import numpy as np
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.design.ground import model_error
 from rotorsoil_ros.case.design.report import Acceptance
 from rotorsoil_ros.case.journal_entries import BEYOND
 from rotorsoil_ros.case.summary import (
     clipped,
     derived_quantities,
     implausible,
-    model_error,
     near_threshold,
     stability_doubts,
     undecided,

@@ -6,7 +6,14 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.ground.soil import Circle, Contact, extents, SoilModel
+from rotorsoil_ros.ground.soil import (
+    Circle,
+    Contact,
+    extents,
+    second_opinion_of,
+    singular_of,
+    SoilModel,
+)
 
 # Largest error of any stiffness where discs of equal area and second moment stand for a welded
 # rectangle, over a0 up to 3.8 and nu 0.25 to 1/3, against rigorous solutions of the rectangle:
@@ -40,6 +47,16 @@ class StifferGround:
 
     model: SoilModel
     share: float
+
+    @property
+    def singular(self) -> FloatArray:
+        """Where a wave of the layers begins to travel, rising [rad/s]."""
+        return singular_of(self.model)
+
+    @property
+    def second_opinion(self) -> 'StifferGround':
+        """A poorer model of the same ground."""
+        return StifferGround(second_opinion_of(self.model), self.share)
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""

@@ -9,6 +9,7 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
+from rotorsoil_ros.ground.layers.model import ThinLayerModel
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel, static_scale
 
 
@@ -52,6 +53,9 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
     """
     Return a model of the same kind as a given one, below the same contacts, on another soil.
 
+    Layers are all stiffened and made heavier in the ratio in which the one below the base is,
+    which is exact; their other figures stay.
+
     Raises
     ------
     RotorSoilError
@@ -68,6 +72,10 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
             table = replace(table, loss_factor=soil.loss_factor)
             return NeighbourSoil(InfiniteElementModel(as_solved, contact, table),
                                  soil.poisson_ratio)
+        case ThinLayerModel():
+            own = model.ground.at(model.embedment.depth)
+            return model.scaled(modulus=soil.shear_modulus / own.shear_modulus,
+                                density=soil.density / own.density)
     raise RotorSoilError(f'a support of type {type(model).__name__} does not depend on the soil')
 
 

@@ -38,6 +38,9 @@ _BANDWIDTH = (-1.0, -0.5, 0.0, 0.5, 1.0)
 # Entries that stay below this share of their diagonal are round-off.
 _UNCOUPLED = 1e-10
 
+# Poles closer to a node than this share of the highest lie on it.
+_ON_A_NODE = 1e-14
+
 # Stands for the distance to a node that is hit: small, yet its inverse is finite.
 _ON_NODE = 1e-150
 
@@ -85,6 +88,9 @@ class Continuation:
     @classmethod
     def of(
         cls, omega: FloatArray, known: Callable[[FloatArray], ComplexArray],
+        size: FloatArray | None = None,
+        other: Callable[[FloatArray], ComplexArray] | None = None,
+        within: tuple[float, float] = (-np.inf, np.inf),
     ) -> 'Continuation':
         """
         Fit a function.
@@ -95,19 +101,26 @@ class Continuation:
             Frequencies at which it is sampled, ascending [rad/s].
         known : callable
             From real frequencies (n,) to matrices (n, d, d).
+        size : (d,) float array, optional
+            As the attribute, where several continuations have to share it.
+        other : callable, optional
+            A second opinion on the function, in place of its own every other sample.
+        within : tuple of two floats
+            Frequencies between which it has to stand for something passive [rad/s].
 
         """
         values = known(omega)
-        largest = np.abs(values.diagonal(axis1=1, axis2=2)).max(axis=0, initial=0.0)
-        size: FloatArray = np.sqrt(np.where(largest > 0.0, largest, 1.0))
+        if size is None:
+            size = typical_size(values)
         values = values / (size[:, None] * size)
         couples = np.abs(values).max(axis=0, initial=0.0) > _UNCOUPLED
         _, labels = connected_components(couples, directed=False)
         groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+        second = values[::2] if other is None else other(omega[::2]) / (size[:, None] * size)
         parts, others = (
-            tuple((index, RationalMatrix.of(
-                omega[::step], values[::step, index[:, None], index])) for index in groups)
-            for step in (1, 2))
+            tuple((index, RationalMatrix.of(places, samples[:, index[:, None], index], within))
+                  for index in groups)
+            for places, samples in ((omega, values), (omega[::2], second)))
         fit = cls(parts, others, size, None, (float(omega[0]), float(omega[-1])), 0.0)
         missed = float(np.abs(fit(omega.astype(complex)) - values).max(initial=0.0))
         return replace(fit, known=known, missed=missed) if missed > _EXACT else fit
@@ -177,6 +190,12 @@ class Continuation:
         return total
 
 
+def typical_size(values: ComplexArray) -> FloatArray:
+    """Return the root of the largest diagonal entries of matrices (n, d, d), or one, (d,)."""
+    largest = np.abs(values.diagonal(axis1=1, axis2=2)).max(axis=0, initial=0.0)
+    return np.asarray(np.sqrt(np.where(largest > 0.0, largest, 1.0)))
+
+
 @dataclass(frozen=True, slots=True)
 class States:
     """
@@ -223,8 +242,10 @@ class RationalMatrix:
     weights: ComplexArray
 
     @classmethod
-    def of(cls, omega: FloatArray, values: ComplexArray) -> 'RationalMatrix':
-        """Fit samples (n, d, d) at ascending frequencies (n,)."""
+    def of(
+        cls, omega: FloatArray, values: ComplexArray, within: tuple[float, float],
+    ) -> 'RationalMatrix':
+        """Fit samples (n, d, d) at ascending frequencies (n,), as `continues` has them."""
         entries = values.reshape(len(omega), -1)
         chosen, fits = _greedy(omega, entries, np.ones(entries.shape),
                                min(_MOST_NODES, len(omega) // 2), _is_enough)
@@ -233,21 +254,23 @@ class RationalMatrix:
         most = next(count for count, worst in enumerate(errors, 1) if worst <= enough)
         tried = [cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
                  for count in range(1, most + 1)]
-        if tried[-1].continues(omega):
+        if tried[-1].continues(omega, within):
             return tried[-1]
         # The table follows no law that could be continued: noise, or too few points. The best
         # one that may, if only a constant, leaves the rest to what is known at real frequencies.
         sound = [(worst, fit) for worst, fit in zip(errors, tried, strict=False)
-                 if fit.continues(omega)]
+                 if fit.continues(omega, within)]
         return min(sound, key=lambda pair: pair[0])[1]
 
-    def continues(self, omega: FloatArray) -> bool:
+    def continues(self, omega: FloatArray, within: tuple[float, float]) -> bool:
         """
         Return whether the fit may stand for a passive support at complex frequencies.
 
         Samples (n,) [rad/s] that are noisy put poles among growing vibrations, which no cause
         has, or low and narrow peaks anywhere; those of a polynomial, as a spline through few
-        points is one, leave no bound at infinity. Each is a fit to the samples alone.
+        points is one, leave no bound at infinity. Each is a fit to the samples alone. Only what
+        vibrates within two frequencies counts: hysteretic damping, which turns its sign with the
+        frequency, has a growing mirror image of every sharp pole at negative ones.
         """
         if not np.all(np.isfinite(self.weights)) or not self.weights.sum():
             return False
@@ -257,6 +280,7 @@ class RationalMatrix:
         height = (np.abs(found.left).max(axis=0, initial=0.0)
                   * np.abs(found.right).max(axis=1, initial=0.0))
         noise = (decay < -_ON_AXIS) | (narrow & (height < _STEADY * np.abs(found.poles.imag)))
+        noise &= (found.poles.real > within[0]) & (found.poles.real < within[1])
         noise &= np.abs(found.poles) < _NEAR * omega[-1]
         return not noise.any() and bool(np.abs(found.constant).max(initial=0.0) < _BOUND)
 
@@ -276,6 +300,9 @@ class RationalMatrix:
         arrow[1:, 1:] = np.diag(self.nodes)
         poles = scipy.linalg.eigvals(arrow, np.diag([0.0] + [1.0] * count))
         poles = poles[np.isfinite(poles) & (np.abs(poles) < _FAR * self.nodes.max())]
+        # A node without weight is a pole without height.
+        apart = np.abs(poles[:, None] - self.nodes).min(axis=1, initial=np.inf)
+        poles = poles[apart > _ON_A_NODE * self.nodes.max()]
         cauchy = 1.0 / (poles[:, None] - self.nodes)
         flat = self.values.reshape(count, -1)
         residues = (cauchy * self.weights) @ flat / -(cauchy**2 @ self.weights)[:, None]

@@ -235,6 +235,28 @@ def below_each(models: Sequence[SoilModel], blocks: int) -> tuple[SoilModel, ...
     return tuple(models)
 
 
+def singular_of(model: SoilModel) -> FloatArray:
+    """
+    Return at which frequencies the compliance of a model has a branch point, rising [rad/s].
+
+    There waves of a layer begin to travel: on both sides different functions continue it to
+    vibrations that decay. A model without such places need not say so.
+    """
+    found: FloatArray = getattr(model, 'singular', np.zeros(0))
+    return found
+
+
+def second_opinion_of(model: SoilModel) -> SoilModel:
+    """
+    Return a poorer model of the same ground, or the model itself if there is none.
+
+    What both say of real frequencies is nearly the same; what they say of vibrations that decay
+    differs where the solves do not determine it.
+    """
+    found: SoilModel = getattr(model, 'second_opinion', model)
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class RigidSoil:
     """Ground that does not move: the textbook support, as compliance zero."""

@@ -13,6 +13,7 @@ from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, require, Rotor
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupling import Answer, answer
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.modes.natural import natural_frequencies
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.prediction import Prediction, Response
 from rotorsoil_ros.rotor.assembly import Rotor
@@ -335,7 +336,7 @@ class CoupledModel:
 
         """
         column = ACROSS.index(axis)
-        frequency, motion = self.support.natural_frequencies(self._riding_mass, highest)
+        frequency, motion = natural_frequencies(self.support, self._riding_mass, highest)
         power = np.abs(motion).reshape(len(motion), len(self.rotor.bearings), 2) ** 2
         total = power.sum(axis=(1, 2))
         # A block that slides along the shaft moves no housing across it, but for round-off.

@@ -1,8 +1,9 @@
 """How the bearing housings move under the forces that the bearings put into them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 import math
 
 import numpy as np
@@ -10,19 +11,25 @@ import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
-from rotorsoil_ros.ground.rational import Continuation
-from rotorsoil_ros.ground.soil import below_each, SharedGround, SoilModel
+from rotorsoil_ros.ground.rational import Continuation, typical_size
+from rotorsoil_ros.ground.soil import (
+    below_each,
+    second_opinion_of,
+    SharedGround,
+    singular_of,
+    SoilModel,
+)
 from rotorsoil_ros.machine.foundation import BlockReceptance, carrying, Foundation
 from rotorsoil_ros.rotor.bearing import Bearing
 
-# Samples from which the compliance is continued.
+# Samples from which the compliance is continued, and those of a piece between branch points.
 _SAMPLES = 120
+_PIECE_SAMPLES = 48
 
-# Poles of the soil that weigh less are noise of its fit.
-_NOISE = 1e-4
-
-# What hardly swings, |Re w| below this share of |w|, has no natural frequency.
-_CREEPING = 0.2
+# A piece is longer than this share of the highest frequency.
+_NO_PIECE = 1e-6
+# Relative to its end: in a shorter one no vibration is told, only the response.
+_NARROW = 0.03
 
 
 @dataclass(frozen=True)
@@ -178,6 +185,14 @@ class Support:
         total[:, blocks:, blocks:] = self.pedestals(omega)[:, axes[:, None], axes]
         return total
 
+    @property
+    def _other(self) -> Callable[[FloatArray], ComplexArray] | None:
+        """What a second opinion says of the same, where some soil has one."""
+        others = tuple(map(second_opinion_of, self.soil_models))
+        if all(other is own for other, own in zip(others, self.soil_models, strict=True)):
+            return None
+        return replace(self, soil_models=others).motion_compliance
+
     def answers(self, omega: float) -> bool:
         """Return whether every soil knows its compliance at a frequency [rad/s]."""
         try:
@@ -207,53 +222,36 @@ class Support:
         omega = np.unique(np.concatenate([
             np.linspace(low, high, _SAMPLES // 2),
             np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
-        return Continuation.of(omega, self.motion_compliance)
+        return Continuation.of(omega, self.motion_compliance, other=self._other)
 
-    def natural_frequencies(
-        self, carried: FloatArray, highest: float,
-    ) -> tuple[FloatArray, ComplexArray]:
+    def _singular(self, span: tuple[float, float]) -> FloatArray:
+        """Return the branch points of all soils inside a span, rising [rad/s]."""
+        low, high = span
+        found = np.unique(np.concatenate([np.zeros(0), *map(singular_of, self.soil_models)]))
+        return np.asarray(found[(found > low + _NO_PIECE * high)
+                                & (found < (1.0 - _NO_PIECE) * high)])
+
+    def continued_by_pieces(self, span: tuple[float, float]) -> tuple[Continuation, ...]:
         """
-        Return how the support vibrates under bodies that are rigid themselves.
+        Return continuations between the frequencies where the soil has branch points.
 
-        Parameters
-        ----------
-        carried : (2 b, 2 b) float array
-            Mass over (x, z) of the housings [kg].
-        highest : float
-            Frequency up to which to look, as far as the soil is known [rad/s].
-
-        Returns
-        -------
-        frequency : (m,) float array
-            |lambda| of what vibrates, rising [rad/s].
-        motion : (m, 2 b) complex array
-            Of the housings.
-
+        Each is fitted to frequencies of its own piece alone and holds for vibrations whose
+        frequency lies in it; all have one size. Between two branch points so close that no
+        function could be told from the next, there is none.
         """
-        if not len(self.motion_mass):
-            return np.zeros(0), np.zeros((0, len(carried)), dtype=complex)
-        span = self.known(highest)
-        compliance = self.continued(span)
-        size, unit, soil = compliance.size, 0.5 * span[1], compliance.states(_NOISE)
-        rows = self.motion_rows * size
-        mass = size[:, None] * self.motion_mass * size + rows.T @ carried @ rows
-        own, states = len(mass), len(soil.poles)
-        # z = constant p + left xi, w xi = poles xi + right p, p = w^2 M z with w z = unit u.
-        a = np.zeros((2 * own + states,) * 2, dtype=complex)
-        b = np.zeros_like(a)
-        motion, rate, state = slice(0, own), slice(own, 2 * own), slice(2 * own, None)
-        a[motion, motion], a[motion, state] = np.eye(own), -soil.left
-        b[motion, rate] = unit * soil.constant @ mass
-        a[rate, rate], b[rate, motion] = unit * np.eye(own), np.eye(own)
-        a[state, state] = np.diag(soil.poles)
-        b[state, rate], b[state, state] = -unit * soil.right @ mass, np.eye(states)
-        frequency, vectors = scipy.linalg.eig(a, b)
-        finite = np.isfinite(frequency)
-        frequency, vectors = frequency[finite], vectors[:, finite]
-        chosen = np.flatnonzero((frequency.real > _CREEPING * np.abs(frequency))
-                                & (np.abs(frequency) <= span[1]))
-        chosen = chosen[np.argsort(np.abs(frequency[chosen]))]
-        return np.abs(frequency[chosen]), (rows @ vectors[motion, chosen]).T
+        (low, high), singular = span, self._singular(span)
+        if not singular.size:
+            return (self.continued(span),)
+        edges = np.concatenate([[low], singular, [high]])
+        edges = edges[np.diff(edges, prepend=-math.inf) > _NO_PIECE * high]
+        edges[-1] = high
+        along = 0.5 * (1.0 - np.cos(np.pi * np.arange(_PIECE_SAMPLES) / (_PIECE_SAMPLES - 1)))
+        samples = [left + (right - left) * along for left, right in pairwise(edges.tolist())
+                   if right - left > _NARROW * right]
+        size = typical_size(self.motion_compliance(np.concatenate(samples)))
+        return tuple(Continuation.of(
+            omega, self.motion_compliance, size, self._other,
+            (float(omega[0]), float(omega[-1]))) for omega in samples)
 
 
 @dataclass(frozen=True)

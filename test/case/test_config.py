@@ -110,7 +110,8 @@ def test_probe_is_a_channel():
     ('soil=3', 'soil: must hold keys and values, got 3'),
     ('rotor.discs=3', 'rotor.discs: must be a list, got 3'),
     ('support.model=cones',
-     "support.model: must be 'rigid', 'cone', 'infinite_elements' or 'table', got 'cones'"),
+     "support.model: must be 'rigid', 'cone', 'infinite_elements', 'thin_layers' or 'table', got "
+     "'cones'"),
     ('foundations.0.inertia=[1, 2]', 'foundations.0.inertia.2: is missing'),
     ('foundations.0.inertia=[1, 2, 3, 4]',
      'foundations.0.inertia: has more entries than it should: [1, 2, 3, 4]'),

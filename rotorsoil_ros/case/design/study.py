@@ -11,10 +11,10 @@ from rotorsoil_ros.case import document
 from rotorsoil_ros.case.authoring.comments import Guess, guesses
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.advice import findings, next_step, verdict_of
+from rotorsoil_ros.case.design.ground import band_contents, model_error
 from rotorsoil_ros.case.design.influence import extremes, influences
 from rotorsoil_ros.case.design.margins import near_modes
 from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
-from rotorsoil_ros.case.summary import band_contents, model_error
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, HOUSING
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError

@@ -13,7 +13,8 @@ from rotorsoil_ros.case.document import shown
 # Which of two shapes a value has, where a file may choose; no key can be called so.
 CONSTANT, TABLE, NUMBER, AXES = '<constant>', '<table>', '<number>', '<axes>'
 KEYS, WORD = '<keys>', '<word>'
-_SHAPES = (CONSTANT, TABLE, NUMBER, AXES, KEYS, WORD)
+EVEN, LAYERED = '<even>', '<layered>'
+_SHAPES = (CONSTANT, TABLE, NUMBER, AXES, KEYS, WORD, EVEN, LAYERED)
 
 _WHAT = {
     'missing': 'is missing',

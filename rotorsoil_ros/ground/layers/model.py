@@ -160,9 +160,15 @@ class ThinLayerModel:
         """Frequencies at which a wave of the layers begins to travel, rising [rad/s]."""
         return np.asarray(self.table.edges[1:-1] * self._unit[2])
 
-    def stiffened(self, factor: float) -> 'ThinLayerModel':
-        """Return the model on ground with every shear modulus times a factor: exact."""
-        return replace(self, ground=self.ground.stiffened(factor))
+    @property
+    def second_opinion(self) -> 'ThinLayerModel':
+        """The same ground by poorer functions, which differ where solves do not decide."""
+        return replace(self, table=self.table.second)
+
+    def scaled(self, *, modulus: float, density: float = 1.0) -> 'ThinLayerModel':
+        """Return the model on ground with all moduli and densities times a factor: exact."""
+        return replace(self, ground=self.ground.changed(lambda soil: replace(
+            soil, shear_modulus=modulus * soil.shear_modulus, density=density * soil.density)))
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """

@@ -89,11 +89,6 @@ class LayeredSoil:
             tuple(replace(layer, soil=change(layer.soil)) for layer in self.layers),
             None if self.below is None else change(self.below))
 
-    def stiffened(self, factor: float) -> 'LayeredSoil':
-        """Return the ground with every shear modulus times a factor."""
-        return self.changed(lambda soil: replace(
-            soil, shear_modulus=factor * soil.shear_modulus))
-
     def on_rock(self, depth: float) -> 'LayeredSoil':
         """
         Return what lies above rigid rock at a depth [m].
@@ -135,8 +130,9 @@ class Embedment:
         require(0.0 <= self.side_contact <= 1.0, 'side_contact',
                 'in [0, 1], the share of the embedment that is welded', self.side_contact)
         if self.depth == 0.0 and self.side_contact != 1.0:
-            raise RotorSoilError('side_contact belongs to an embedment > 0 m: a block on the '
-                                 f'surface has no wall in the ground, got {self.side_contact:g}')
+            raise RotorSoilError('side_contact must stand beside an embedment > 0 m: a block on '
+                                 'the surface has no wall in the ground, got '
+                                 f'{self.side_contact:g}')
 
     @property
     def free_depth(self) -> float:
@@ -145,6 +141,16 @@ class Embedment:
 
 
 SURFACE = Embedment()
+
+
+def require_lossy(soil: Soil) -> None:
+    """Raise a RotorSoilError if a layer of this soil would resonate without bound, or lock."""
+    require(soil.loss_factor >= LEAST_LOSS_FACTOR, 'loss_factor',
+            f'>= {LEAST_LOSS_FACTOR:g} in layered or embedded ground: without it a layer '
+            'resonates without bound, and no soil has less', soil.loss_factor)
+    require(soil.poisson_ratio <= LARGEST_LAYER_POISSON_RATIO, 'poisson_ratio',
+            f'<= {LARGEST_LAYER_POISSON_RATIO:g} in layered or embedded ground',
+            soil.poisson_ratio)
 
 
 def require_room(ground: LayeredSoil, embedment: Embedment) -> None:

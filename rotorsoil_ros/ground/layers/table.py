@@ -1,7 +1,7 @@
 """What is known of layered ground over frequency: rational functions between its cut-offs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -29,6 +29,8 @@ class LayeredTable:
         Ends of the pieces, rising from 0: all but the ends are singular frequencies [-].
     pieces : tuple of p RationalMatrix
         Functions of a0 with the entries `ENTRIES`.
+    poorer : tuple of p RationalMatrix
+        The same through fewer solves: both agree where the solves decide.
     measured_error : float
         Largest error of any piece at frequencies that it had not seen, or, where that is larger,
         its largest change anywhere when they were added to it; relative, of a coupling to the
@@ -40,6 +42,7 @@ class LayeredTable:
 
     edges: FloatArray
     pieces: tuple[RationalMatrix, ...]
+    poorer: tuple[RationalMatrix, ...]
     measured_error: float
     solves: int
     nodes: int
@@ -67,14 +70,20 @@ class LayeredTable:
             values[own] = self.pieces[index](a0[own].astype(complex))
         return values
 
+    @property
+    def second(self) -> 'LayeredTable':
+        """The table with its poorer functions in place of its own."""
+        return replace(self, pieces=self.poorer)
+
     def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the table as plain arrays, for a file that needs no pickle."""
+        functions = (*self.pieces, *self.poorer)
         return {
             'edges': self.edges,
-            'sizes': np.array([len(piece.nodes) for piece in self.pieces]),
-            'support': np.concatenate([piece.nodes for piece in self.pieces]),
-            'values': np.concatenate([piece.values for piece in self.pieces]),
-            'weights': np.concatenate([piece.weights for piece in self.pieces]),
+            'sizes': np.array([len(one.nodes) for one in functions]),
+            'support': np.concatenate([one.nodes for one in functions]),
+            'values': np.concatenate([one.values for one in functions]),
+            'weights': np.concatenate([one.weights for one in functions]),
             'measured_error': np.array(self.measured_error),
             'solves': np.array(self.solves), 'nodes': np.array(self.nodes),
         }
@@ -100,14 +109,16 @@ class LayeredTable:
             solves, nodes = int(arrays['solves']), int(arrays['nodes'])
         except (KeyError, TypeError, ValueError) as problem:
             raise RotorSoilError(f'not a table of layered ground: {problem}') from problem
-        if not (len(edges) == len(ends) + 1 > 1 and values.shape == (len(support), len(ENTRIES))
+        if not (2 * len(edges) == len(ends) + 2 > 2
+                and values.shape == (len(support), len(ENTRIES))
                 and weights.shape == support.shape == (ends[-1],)
                 and all(np.isfinite(part).all() for part in (edges, support, values, weights))
                 and math.isfinite(error)):
             raise RotorSoilError('not a table of layered ground: its arrays do not fit')
-        pieces = tuple(map(RationalMatrix, *(np.split(part, ends[:-1])
-                                             for part in (support, values, weights))))
-        return cls(edges, pieces, error, solves, nodes)
+        functions = tuple(map(RationalMatrix, *(np.split(part, ends[:-1])
+                                                for part in (support, values, weights))))
+        half = len(edges) - 1
+        return cls(edges, functions[:half], functions[half:], error, solves, nodes)
 
 
 def entry_scale(values: ComplexArray) -> FloatArray:

@@ -26,6 +26,8 @@ _COMPARED = 200
 
 # A fit follows no sample closer than this, or it would follow round-off.
 _EXACT = 3e-6
+# The second opinion follows them this many times less.
+_POORER = 4.0
 # Share of the samples at which a fit is exact at most, and that of a poorer one beside it.
 _SUPPORT_SHARE = 0.8
 _POORER_SHARE = 0.65
@@ -135,16 +137,18 @@ def tabulate(
     edges = np.concatenate([[0.0], singular_frequencies(ground, a0_max), [a0_max]])
     lowest = min(_LOWEST_A0, 0.05 * float(edges[1]))
     worst, solves, nodes = 0.0, 0, 0
-    pieces = []
+    pieces, poorer = [], []
     for left, right in pairwise(edges.tolist()):
         # Lower pieces have longer waves and need fewer elements.
         cylinder = _cylinder(ground, embedment, radii, (max(left, lowest), right), LineMesh())
         exact = _ExactPiece(cylinder, radii)
-        piece, error = _piece(exact, max(left, lowest), right, tolerance, from_rest=left == 0.0)
+        piece, other, error = _piece(exact, max(left, lowest), right, tolerance,
+                                     from_rest=left == 0.0)
         pieces.append(piece)
+        poorer.append(other)
         worst, nodes = max(worst, error), max(nodes, len(cylinder.line.depth))
         solves += exact.solves
-    return LayeredTable(edges, tuple(pieces), worst, solves, nodes)
+    return LayeredTable(edges, tuple(pieces), tuple(poorer), worst, solves, nodes)
 
 
 @dataclass(slots=True)
@@ -162,12 +166,12 @@ class _ExactPiece:
 
 def _piece(
     solve: _ExactPiece, left: float, right: float, tolerance: float, *, from_rest: bool,
-) -> tuple[RationalMatrix, float]:
-    """Return a function between two frequencies, and its error."""
+) -> tuple[RationalMatrix, RationalMatrix, float]:
+    """Return a function between two frequencies, a poorer one, and the error of the former."""
     is_narrow = right - left < _NARROW * right
-    omega = _chebyshev(left, right, _FIRST_IF_NARROW if is_narrow else _FIRST_SOLVES)
+    omega = _towards_ends(left, right, _FIRST_IF_NARROW if is_narrow else _FIRST_SOLVES)
     values = solve(omega)
-    everywhere = _chebyshev(0.0 if from_rest else left, right, _COMPARED).astype(complex)
+    everywhere = _towards_ends(0.0 if from_rest else left, right, _COMPARED).astype(complex)
     fit = _fit(omega, values, _SUPPORT_SHARE)
     while True:
         middles = _least_known(omega, values)
@@ -180,7 +184,10 @@ def _piece(
         # The better fit has met no unseen frequency: it must not stray from the one that has.
         error = max(error, _difference(fit(everywhere), checked(everywhere)))
         if error <= tolerance:
-            return fit, error
+            other = interpolant(
+                omega[::-1], values[::-1], scale=entry_scale(values[::-1]),
+                most=max(2, len(fit.nodes) - 1), tolerance=_POORER * _EXACT)
+            return fit, other, error
         if len(omega) > _MOST_SOLVES:
             raise NotSolvedError(
                 f'the compliance of layered ground between a0 = {left:.4g} and {right:.4g} still '
@@ -208,9 +215,16 @@ def _difference(values: ComplexArray, reference: ComplexArray) -> float:
     return float((np.abs(values - reference) / entry_scale(reference)).max())
 
 
-def _chebyshev(lowest: float, highest: float, count: int) -> FloatArray:
-    """Return Chebyshev points, ends included: singular frequencies lie there."""
-    position = (1.0 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2.0
+def _towards_ends(lowest: float, highest: float, count: int) -> FloatArray:
+    """
+    Return points that crowd towards both ends, which are among them.
+
+    Twice as Chebyshev points do: a singularity lies just beside each end, and light vibrations
+    just below a cut-off, where radiation begins.
+    """
+    position = np.arange(count) / (count - 1)
+    for _ in range(2):
+        position = 0.5 * (1.0 - np.cos(np.pi * position))
     points: FloatArray = lowest + (highest - lowest) * position
     points[-1] = highest
     return points

@@ -23,6 +23,9 @@ _ITERATIONS = 12
 # A guess that moves farther, relative to itself, was hardly one of this mode.
 _NEAR_GUESS = 0.05
 
+# Guesses this far outside the piece of their compliance may still lead into it.
+_ASIDE = 0.05
+
 # Two vectors are one from this cosine on, at frequencies equal within the steps.
 _SAME = 0.999
 
@@ -53,6 +56,8 @@ class FreeVibration:
         Frequency up to which modes are looked for [rad/s].
     reach : float
         Rotor modes up to this many times `highest` are unknowns of their own.
+    within : tuple of two floats
+        Frequencies between which the compliance holds [rad/s].
 
     """
 
@@ -65,6 +70,7 @@ class FreeVibration:
     compliance: Continuation
     highest: float
     reach: float
+    within: tuple[float, float]
 
     @cached_property
     def _modes(self) -> tuple[FloatArray, ComplexArray]:
@@ -222,7 +228,10 @@ class FreeVibration:
         values, vectors = np.linalg.eig(spread[:, memory])
         values = np.where(np.abs(values) * self.highest < 1e-6, 1e-6 / self.highest, values)
         frequency = centre + 1.0 / values
-        keep = vibrates(frequency) & (np.abs(frequency) < 2.0 * self.highest)
+        low, high = self.within
+        keep = (vibrates(frequency) & (np.abs(frequency) < 2.0 * self.highest)
+                & (frequency.real > (1.0 - _ASIDE) * low)
+                & (frequency.real < (1.0 + _ASIDE) * high))
         count = min(int(keep.sum(axis=1).max()), count)
         order = np.argsort(np.where(keep, frequency.real, np.inf), axis=1)[:, :count]
         ports, modes = len(self.rows), self.resonant.shape[1]

@@ -158,7 +158,7 @@ def feeds(pencil: Pencil, vibrations: Vibrations, index: int) -> tuple[Feed, ...
     blocks = 6 * len(pencil.model.foundations)
     terms = [(bearing.name, _taken(w, gap[pair], stiffness.real[pair, pair], damping[pair, pair]))
              for bearing, pair in zip(pencil.model.rotor.bearings, _pairs(0), strict=False)]
-    deflection = support * pencil.solver.compliance.size
+    deflection = support * pencil.compliance.size
     terms += [(f'the pedestal of {bearing.name}',
                _taken(w, deflection[pair], bearing.pedestal.stiffness, bearing.pedestal.damping))
               for bearing, pair in zip((one for one in pencil.model.rotor.bearings

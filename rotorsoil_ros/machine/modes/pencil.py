@@ -1,12 +1,13 @@
 """Every free vibration at a speed, growing and creeping ones too, and how it turns with speed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+import math
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.ground.rational import States
+from rotorsoil_ros.ground.rational import Continuation, States
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.rotor.whirl import ORBITS
@@ -37,7 +38,7 @@ class Vibrations:
     frequency, slope : (m,) complex arrays
         w = lambda / i [rad/s], damped frequency + i decay, and its change with the speed [-].
     vector : (m, d) complex array
-        Unknowns of `Pencil`, a row for each.
+        Unknowns of `Pencil` but the states of the soil, a row for each.
 
     """
 
@@ -61,21 +62,41 @@ class Pencil:
     model : CoupledModel
         The machine.
     solver : SpectrumSolver
-        Its rotor in few coordinates, and the compliance of its support, continued.
+        Its rotor in few coordinates, and the compliance of its support, continued by pieces.
+    piece : int
+        Which of these this pencil is made of; `at` asks the others for what lies in theirs.
 
     """
 
     model: CoupledModel
     solver: SpectrumSolver
+    piece: int = 0
 
     @classmethod
     def up_to(cls, model: CoupledModel, highest: float) -> 'Pencil':
         """Prepare for vibrations up to a frequency [rad/s], as far as the soil is known."""
         return cls(model, SpectrumSolver.up_to(model, highest))
 
+    @property
+    def compliance(self) -> Continuation:
+        """Compliance of the support without its mass, where this pencil holds."""
+        return self.solver.pieces[self.piece]
+
+    @cached_property
+    def _all(self) -> tuple['Pencil', ...]:
+        """Pencils between all branch points of the soil."""
+        return tuple(replace(self, piece=piece) for piece in range(len(self.solver.pieces)))
+
+    @cached_property
+    def _within(self) -> tuple[float, float]:
+        """Frequencies up to the next pencil's [rad/s]; what creeps belongs to the first."""
+        pieces = self.solver.pieces
+        return (-math.inf if self.piece == 0 else self.compliance.span[0],
+                math.inf if self.piece + 1 == len(pieces) else pieces[self.piece + 1].span[0])
+
     @cached_property
     def _soil(self) -> States:
-        return self.solver.compliance.states(_NOISE)
+        return self.compliance.states(_NOISE)
 
     @cached_property
     def unit(self) -> float:
@@ -96,12 +117,12 @@ class Pencil:
         """Motion of the housings per motion of the support, (2 b, s)."""
         unit = np.repeat(np.sqrt(self.model.nominal_springs), 2)
         return np.asarray(unit[:, None] * self.model.support.motion_rows
-                          * self.solver.compliance.size)
+                          * self.compliance.size)
 
     @cached_property
     def mass(self) -> FloatArray:
         """Mass of the support, (s, s)."""
-        size = self.solver.compliance.size
+        size = self.compliance.size
         return np.asarray(size[:, None] * self.model.support.motion_mass * size)
 
     @cached_property
@@ -191,7 +212,8 @@ class Pencil:
         """Return all vibrations at each of the speeds (n,) [rad/s]."""
         found: list[Vibrations] = []
         for start in range(0, len(speed), _CHUNK):
-            found += self._at(speed[start:start + _CHUNK])
+            parts = [one._at(speed[start:start + _CHUNK]) for one in self._all]
+            found += [_joined(same) for same in zip(*parts, strict=True)]
         return found
 
     def _at(self, speed: FloatArray) -> list[Vibrations]:
@@ -211,10 +233,21 @@ class Pencil:
         for row, place in enumerate(speed.tolist()):
             own = np.abs(values[row]) * self.solver.span[1] > 1e-9
             inverse = values[row, own]
-            found.append(Vibrations(place, centre + 1.0 / inverse,
-                                    -drift[row, own] / inverse**2, full[row][:, own].T))
+            frequency = centre + 1.0 / inverse
+            kept = (frequency.real >= self._within[0]) & (frequency.real < self._within[1])
+            # States of the soil differ from piece to piece, and nobody asks for them.
+            shapes = full[row][:self.places['soil'].start, own]
+            found.append(Vibrations(place, frequency[kept],
+                                    (-drift[row, own] / inverse**2)[kept], shapes[:, kept].T))
         return found
 
     def part(self, found: Vibrations, index: int, name: str) -> ComplexArray:
         """Return the named unknowns of one vibration."""
         return np.asarray(found.vector[index, self.places[name]])
+
+
+def _joined(parts: tuple[Vibrations, ...]) -> Vibrations:
+    """Return the vibrations of all pieces at one speed."""
+    return Vibrations(parts[0].speed, *(
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ('frequency', 'slope', 'vector')))

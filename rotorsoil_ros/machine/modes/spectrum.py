@@ -84,8 +84,8 @@ class SpectrumSolver:
         The machine.
     basis : ReducedRotor
         Its rotor in a subspace.
-    compliance : Continuation
-        Of the support without its mass.
+    pieces : tuple of Continuation
+        Compliance of the support without its mass, between the branch points of the soil.
     span : tuple of two floats
         Frequencies between which modes are looked for [rad/s].
 
@@ -93,7 +93,7 @@ class SpectrumSolver:
 
     model: CoupledModel
     basis: ReducedRotor
-    compliance: Continuation
+    pieces: tuple[Continuation, ...]
     span: tuple[float, float]
 
     @classmethod
@@ -120,7 +120,7 @@ class SpectrumSolver:
                 break
             shapes = slow + _MORE_SHAPES
         low, high = model.support.known(highest)
-        return cls(model, basis, model.support.continued((low, high)), (low, high))
+        return cls(model, basis, model.support.continued_by_pieces((low, high)), (low, high))
 
     @classmethod
     def lowest(
@@ -212,23 +212,28 @@ class SpectrumSolver:
 
     def _solve(self, speed: FloatArray, count: int, spare: int) -> Spectrum:
         basis = self.basis
-        inverse, amplitude = basis.spin(np.maximum(speed, _CREEP * basis.mass.max() ** -0.5))
+        spin = basis.spin(np.maximum(speed, _CREEP * basis.mass.max() ** -0.5))
+        return _merged([self._solve_piece(speed, spin, piece, count + spare)
+                        for piece in self.pieces], count)
+
+    def _solve_piece(
+        self, speed: FloatArray, spin: tuple[FloatArray, FloatArray], piece: Continuation,
+        count: int,
+    ) -> Spectrum:
+        """Return the vibrations whose frequency lies where a continuation holds."""
         for reach in _REACHES:
-            vibration = self._at(speed, inverse, amplitude, reach)
-            frequency, vector, sound, untold = vibration.solve(count + spare)
+            vibration = self._at(speed, spin, piece, reach)
+            frequency, vector, sound, untold = vibration.solve(count)
             if sound.all():
                 break
         else:
             raise NotSolvedError('modes could not be told apart at '
                                  f'{rad_s_to_rpm(float(speed[~sound][0])):g} rpm')
-        low, high = self.span
+        low, high = vibration.within
         known = (frequency.real >= low) & (frequency.real <= high)
-        frequency = np.where(known, frequency, np.nan)
-        most = min(count, int(np.isfinite(frequency).sum(axis=1).max()))
-        order = np.argsort(frequency.real, axis=1)[:, :most]
         untold = np.where((untold >= low) & (untold <= high), untold, np.inf)
-        return self._spectrum(vibration, amplitude, np.take_along_axis(frequency, order, axis=1),
-                              np.take_along_axis(vector, order[..., None], axis=1), untold)
+        return self._spectrum(vibration, spin[1], np.where(known, frequency, np.nan), vector,
+                              untold)
 
     def _spectrum(
         self, vibration: FreeVibration, amplitude: FloatArray, frequency: ComplexArray,
@@ -249,13 +254,15 @@ class SpectrumSolver:
         shape = np.concatenate([moving, below], axis=-1)
         return Spectrum(
             frequency, np.where(exists, np.where(forward >= backward, 1, -1), 0),
-            np.where(exists[..., None], shape, np.nan), rotor, support * self.compliance.size,
+            np.where(exists[..., None], shape, np.nan), rotor, support * vibration.compliance.size,
             untold)
 
     def _at(
-        self, speed: FloatArray, inverse: FloatArray, amplitude: FloatArray, reach: float,
+        self, speed: FloatArray, spin: tuple[FloatArray, FloatArray], piece: Continuation,
+        reach: float,
     ) -> FreeVibration:
-        model, support, size = self.model, self.model.support, self.compliance.size
+        inverse, amplitude = spin
+        model, support, size = self.model, self.model.support, piece.size
         rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
         unit = np.sqrt(model.nominal_springs)
         journals = (unit[:, None] * self.basis.shapes[rows]) @ amplitude
@@ -264,7 +271,23 @@ class SpectrumSolver:
         return FreeVibration(
             inverse, journals, stiffness / (unit[:, None] * unit),
             damping / (unit[:, None] * unit), unit[:, None] * support.motion_rows * size,
-            size[:, None] * support.motion_mass * size, self.compliance, self.span[1], reach)
+            size[:, None] * support.motion_mass * size, piece, self.span[1], reach,
+            self.span if len(self.pieces) == 1 else piece.span)
+
+
+def _merged(parts: list[Spectrum], count: int) -> Spectrum:
+    """Return at most `count` vibrations of all pieces, sorted by frequency."""
+    frequency = np.concatenate([part.frequency for part in parts], axis=1)
+    most = min(count, int(np.isfinite(frequency).sum(axis=1).max(initial=0)))
+    order = np.argsort(frequency.real, axis=1)[:, :most]
+    # The rows of one speed are reordered alike, whatever else they hold.
+    rows = np.arange(len(frequency))[:, None]
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts], axis=1)[rows, order]
+
+    return Spectrum(joined('frequency'), joined('whirl'), joined('shape'), joined('rotor'),
+                    joined('support'), np.min([part.untold for part in parts], axis=0))
 
 
 def _highest(basis: ReducedRotor, speed: FloatArray, count: int) -> float:

@@ -367,7 +367,7 @@ def _name(pencil: Pencil, found: Vibrations, mode: int) -> str:
     rotor, support = (pencil.part(found, mode, name) for name in ('rotor', 'support'))
     frequency = float(np.clip(np.abs(found.frequency[mode].real), *pencil.solver.span))
     return ModeNames(pencil.model).of(
-        pencil.solver.deflection(rotor.reshape(2, -1)), support * pencil.solver.compliance.size,
+        pencil.solver.deflection(rotor.reshape(2, -1)), support * pencil.compliance.size,
         frequency=frequency, speed=found.speed)
 
 

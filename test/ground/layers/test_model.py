@@ -71,7 +71,7 @@ def test_damaged_table_is_refused(on_rock, name):
 
 
 def test_one_factor_on_all_moduli_is_a_rescaling(on_rock):
-    stiffer = on_rock.stiffened(4.0)
+    stiffer = on_rock.scaled(modulus=4.0)
     omega = np.array([0.0, 40.0, 110.0, 250.0])
     np.testing.assert_allclose(stiffer.compliance(2.0 * omega), on_rock.compliance(omega) / 4.0,
                                rtol=1e-12)
@@ -138,7 +138,7 @@ def test_rock_at_a_depth_cuts_and_deepens():
      r'poisson_ratio must be <= 0\.499'),
     (lambda: Embedment(-1.0), r'embedment must be >= 0 m'),
     (lambda: Embedment(1.0, 1.5), r'side_contact must be in \[0, 1\]'),
-    (lambda: Embedment(0.0, 0.5), 'side_contact belongs to an embedment > 0 m'),
+    (lambda: Embedment(0.0, 0.5), 'side_contact must stand beside an embedment > 0 m'),
     (lambda: Proportions.of(LayeredSoil((Layer(1.0, CLAY),), None), Circle(1.0), Embedment(1.0),
                             omega_max=10.0), r'embedment must be < 1 m, where the rock begins'),
     (lambda: Proportions.of(LayeredSoil((Layer(1e-3, CLAY),), SAND), Circle(1.0), Embedment(),

@@ -146,7 +146,7 @@ def vibration_of(model, highest):
     """Return the equations of free vibration at one speed, at the first reach."""
     solver = SpectrumSolver.up_to(model, highest)
     speed = np.array([400.0])
-    return solver._at(speed, *solver.basis.spin(speed), 1.5)
+    return solver._at(speed, solver.basis.spin(speed), solver.pieces[0], 1.5)
 
 
 @pytest.mark.parametrize('stiffness', [1e6, 1e9])

@@ -1,0 +1,114 @@
+"""Which ground the entries of a case file describe, and which model of it can stand below."""
+
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from rotorsoil_ros.case import schema
+from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.errors import require
+from rotorsoil_ros.ground.layers.profile import (
+    Embedment,
+    Layer,
+    LayeredSoil,
+    require_lossy,
+    require_room,
+    SURFACE,
+)
+from rotorsoil_ros.ground.soil import Soil
+
+# The only support that knows layers and walls in the ground.
+THIN_LAYERS = 'thin_layers'
+
+
+@dataclass(frozen=True)
+class GroundEntries:
+    """Builds the ground and says at which key it was refused."""
+
+    faults: Faults
+
+    def ground(self) -> LayeredSoil | Soil | None:
+        """Return the ground of a case: layers, a half-space, or None where it tells none."""
+        entry = self.faults.entries.soil
+        if not isinstance(entry, schema.LayersEntry):
+            soil = None if entry is None else self._soil('soil', entry=entry)
+            if soil is None or self.faults.entries.support.model != THIN_LAYERS:
+                return soil
+            with self.faults.at('soil', entry=entry):
+                require_lossy(soil)
+            return LayeredSoil((), soil)
+        if not entry.layers:
+            raise self.faults.error('soil', 'layers', problem='must be at least one, from the '
+                                                              'surface down, got none')
+        layers = self.faults.attempt_each(self._layer, entry.layers)
+        below = entry.below if isinstance(entry.below, str) else self.faults.attempt(
+            lambda: self._soil('soil', 'below', entry=entry.below))
+        if layers is None or below is None:
+            return None
+        return LayeredSoil(layers, None if isinstance(below, str) else below)
+
+    def _layer(self, index: int, entry: schema.LayerEntry) -> Layer:
+        place = ('soil', 'layers', index)
+        soil = self._soil(*place, entry=entry)
+        with self.faults.at(*place, entry=entry):
+            return Layer(entry.thickness, soil)
+
+    def _soil(self, *place: int | str, entry: Any) -> Soil:
+        """Return a soil by its shear modulus or the velocity of its shear waves."""
+        velocity, modulus = entry.shear_wave_velocity, entry.shear_modulus
+        if (velocity is None) is (modulus is None):
+            raise self.faults.error(
+                *place, problem='needs either shear_modulus in Pa or shear_wave_velocity in m/s, '
+                                f'got {"neither" if velocity is None else "both"}')
+        with self.faults.at(*place, entry=entry):
+            if velocity is not None:
+                require(0.0 < velocity < math.inf, 'shear_wave_velocity', '> 0 m/s', velocity)
+                modulus = entry.density * velocity**2
+            soil = Soil(modulus, entry.poisson_ratio, entry.density, entry.loss_factor)
+            if place != ('soil',):
+                require_lossy(soil)
+            return soil
+
+    def embedments(self, ground: LayeredSoil | Soil | None) -> tuple[Embedment, ...] | None:
+        """Return how each block stands in the ground, or None where one is at fault."""
+        def embedment(index: int, entry: schema.FoundationEntry) -> Embedment:
+            model = self.faults.entries.support.model
+            for name in ('embedment', 'side_contact'):
+                given = getattr(entry, name)
+                if given and model != THIN_LAYERS:
+                    raise self.faults.error('foundations', index, name, problem=(
+                        f'belongs to the support model {THIN_LAYERS}, got {given:g} with the '
+                        f'model {model}, which takes every block as standing on the surface'))
+            if not entry.embedment and entry.side_contact is None:
+                return SURFACE
+            with self.faults.at('foundations', index, entry=entry):
+                found = Embedment(entry.embedment, 1.0 if entry.side_contact is None
+                                  else entry.side_contact)
+                if isinstance(ground, LayeredSoil):
+                    require_room(ground, found)
+            return found
+
+        return self.faults.attempt_each(embedment, self.faults.entries.foundations)
+
+    def refuse_unfit_support(self) -> None:
+        """Raise an InputError where the support cannot stand on this ground."""
+        entries, support = self.faults.entries, self.faults.entries.support
+        if support.model == 'rigid':
+            return
+        if entries.soil is None and support.model != 'table':
+            raise self.faults.error('soil', problem='is missing; the support model '
+                                                    f'{support.model} needs it')
+        if isinstance(entries.soil, schema.LayersEntry) and support.model not in (
+                THIN_LAYERS, 'table'):
+            raise self.faults.error('support', 'model', problem=(
+                f'must be {THIN_LAYERS} on soil.layers, got {support.model}, which knows a '
+                'homogeneous half-space only' + (
+                    ': cones on rock miss its resonance by a factor of up to 2.3 and radiate '
+                    'where nothing can' if support.model == 'cone' else '')))
+        if support.model in ('cone', 'table', THIN_LAYERS) and support.geometry != 'disc':
+            raise self.faults.error(
+                'support', 'geometry', problem=f'must be disc for the model {support.model}, '
+                                               f'got {support.geometry}')
+        if not entries.foundations:
+            raise self.faults.error('foundations', problem='is missing; the support model '
+                                                           f'{support.model} needs a block')

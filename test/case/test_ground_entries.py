@@ -1,0 +1,125 @@
+"""Layers, rock and embedment in a case: what it stands for, what it tells, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+import rotorsoil_ros as rs
+from rotorsoil_ros.case.summary import derived_quantities, warnings
+from rotorsoil_ros.errors import InputError
+
+FAN = 'rotorsoil_ros/config/plant_fan.yaml'
+SAND = {'shear_modulus': 100e6, 'poisson_ratio': 0.3, 'density': 1900.0, 'loss_factor': 0.05}
+LAYER = {**SAND, 'thickness': 1.5}
+ROCK = {'layers': [LAYER], 'below': 'rock'}
+THIN = {'model': 'thin_layers'}
+
+
+@pytest.fixture
+def fan(pytestconfig, tmp_path, cache):
+    """Return the plant fan with other keys."""
+    content = yaml.safe_load((pytestconfig.rootpath / FAN).read_text())
+
+    def changed(*, block=None, **keys):
+        path = tmp_path / 'fan.yaml'
+        blocks = [{**content['foundations'][0], **(block or {})}]
+        path.write_text(yaml.safe_dump({**content, 'foundations': blocks, **keys}))
+        return rs.load(path, cache_directory=cache)
+    return changed
+
+
+def test_rock_under_the_fan_multiplies_its_highest_peak(fan):
+    machine = fan(soil=ROCK, support=THIN)
+    run = machine.response(rpm=np.arange(1000.0, 1600.0, 2.0))
+    # 17.8 um of the half-space without rock, on cones.
+    assert np.abs(run['wheel_x'].displacement).max() == pytest.approx(77e-6, rel=0.02)
+
+
+def test_homogeneous_ground_by_thin_layers_is_that_of_infinite_elements(fan):
+    thin, infinite = (fan(support={'model': model}).model.soil_models[0]
+                      for model in ('thin_layers', 'infinite_elements'))
+    omega = np.linspace(5.0, 370.0, 12)
+    one, other = (model.compliance(omega) for model in (thin, infinite))
+    size = np.sqrt(np.abs(np.einsum('nii->ni', other)))
+    assert (np.abs(one - other) / (size[:, :, None] * size[:, None])).max() < 5e-3
+
+
+def test_table_of_layers_is_computed_once(fan, cache):
+    first = fan(soil=ROCK, support=THIN).model.soil_models[0]
+    before = sorted(cache.glob('compliance_*'))
+    stiffer = {'layers': [{**LAYER, 'shear_modulus': 101e6}], 'below': 'rock'}
+    again = fan(soil=stiffer, support=THIN).model.soil_models[0]
+    assert sorted(cache.glob('compliance_*')) == before
+    np.testing.assert_array_equal(again.table.edges, first.table.edges)
+
+
+def test_case_tells_its_layers(fan):
+    machine = fan(soil={'layers': [LAYER], 'below': {**SAND, 'shear_modulus': 300e6}},
+                  support=THIN, block={'embedment': 0.8, 'side_contact': 0.5})
+    told = dict(derived_quantities(machine.case, machine.model.soil_models))
+    assert told['layer 1'].startswith('0 to 1.5 m')
+    assert told['below'].startswith('from 1.5 m, half-space')
+    assert '0.8 m below the surface, 50% of the wall welded' in told['block: base']
+    assert 'thin layers under a disc' in told['block: model error']
+
+
+def test_case_tells_where_waves_begin(fan):
+    machine = fan(soil=ROCK, support=THIN)
+    told = dict(derived_quantities(machine.case, machine.model.soil_models))
+    quarter = math.sqrt(100e6 / 1900.0) / 6.0
+    assert told['block: waves of the layers begin'].startswith(f'at {quarter:.4g}, ')
+    assert told['below'] == 'from 1.5 m, rigid rock, a bound'
+
+
+def test_mass_of_the_displaced_soil_is_asked_about(fan):
+    # 6 m^2 times 1.2 m of concrete and 0.8 m of soil.
+    machine = fan(soil=ROCK, support=THIN, block={
+        'embedment': 0.8, 'mass': 17280.0 + 9120.0})
+    assert any('kg of soil that it displaces must not be part of it' in one
+               for one in warnings(machine.case))
+    machine = fan(soil=ROCK, support=THIN, block={'embedment': 0.8, 'mass': 17280.0})
+    assert not any('displaces' in one for one in warnings(machine.case))
+
+
+def test_buried_block_is_asked_about(fan):
+    machine = fan(soil={'layers': [LAYER], 'below': SAND}, support=THIN,
+                  block={'embedment': 1.4})
+    assert any('its top lies below the surface' in one for one in warnings(machine.case))
+
+
+@pytest.mark.parametrize('keys, faults', [
+    ({'soil': {'layers': [LAYER]}}, ['soil.below: is missing']),
+    ({'soil': {'layers': [], 'below': 'rock'}}, ['soil.layers: must be at least one']),
+    ({'soil': {**SAND, **ROCK}}, [
+        f'soil.{key}: is not a known key' for key in sorted(SAND)]),
+    ({'soil': {**ROCK, 'below': 'granite'}}, ["soil.below: must be 'rock', got 'granite'"]),
+    ({'soil': {'layers': [{**LAYER, 'thickness': -1.0}, {**LAYER, 'loss_factor': 0.0}],
+               'below': {**SAND, 'shear_modulus': -1.0}}},
+     ['soil.layers.0.thickness: must be > 0 m', 'soil.layers.1.loss_factor: must be >= 0.005',
+      'soil.below.shear_modulus: must be > 0 Pa']),
+    ({'soil': {**SAND, 'loss_factor': 0.0}}, ['soil.loss_factor: must be >= 0.005']),
+    ({'soil': ROCK, 'support': {'model': 'cone'}},
+     ['support.model: must be thin_layers on soil.layers, got cone']),
+    ({'soil': ROCK, 'support': {'model': 'infinite_elements'}},
+     ['support.model: must be thin_layers on soil.layers, got infinite_elements']),
+    ({'support': {**THIN, 'geometry': 'plane_strain'}}, ['support.geometry: must be disc']),
+    ({'soil': ROCK, 'block': {'embedment': 1.5}},
+     ['foundations.0.embedment: must be < 1.5 m, where the rock begins, got 1.5']),
+    ({'block': {'embedment': -0.5}}, ['foundations.0.embedment: must be >= 0 m']),
+    ({'block': {'side_contact': 0.5}},
+     ['foundations.0.side_contact: must stand beside an embedment > 0 m']),
+    ({'block': {'embedment': 0.5, 'side_contact': 1.5}},
+     ['foundations.0.side_contact: must be in [0, 1]']),
+    ({'support': {'model': 'cone'}, 'block': {'embedment': 0.5}},
+     ['foundations.0.embedment: belongs to the support model thin_layers, got 0.5']),
+    ({'soil': {'layers': [{**LAYER, 'thickness': 1e-3}], 'below': SAND}},
+     ['foundations.0: thickness must be >= 0.01 of the radius'])])
+def test_impossible_ground_is_one_line_each(fan, keys, faults):
+    with pytest.raises(InputError) as caught:
+        fan(**{'support': THIN, **keys})
+    lines = [line.partition('fan.yaml: ')[2] for line in str(caught.value).splitlines()]
+    assert len(lines) == len(faults)
+    assert [line.startswith(fault) for line, fault in zip(
+        sorted(lines), sorted(faults), strict=True)] == [True] * len(faults), lines
