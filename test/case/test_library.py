@@ -1,6 +1,7 @@
 """What is typical, against published examples, closed forms and the ranges it came from."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ from rotorsoil_ros.case.authoring.questions import Answers
 from rotorsoil_ros.ground.soil import Soil
 
 ECCENTRICITY = 0.6
+PAGE = Path(__file__).parents[2] / 'docs' / 'library.md'
 
 
 def test_ball_and_roller_are_those_of_the_published_examples():
@@ -109,3 +111,38 @@ def test_every_material_of_the_schema_is_in_the_library():
     for name in library.names('materials'):
         assert set(library.entries('materials')[name]) == set(words)
         schema.Section(length=1.0, outer_diameter=0.1, elements=1, material=name)
+
+
+def rows():
+    """Yield every row of the tables of the manual, of the files of the library."""
+    def span(values):
+        return f'{values[0]:g} to {values[1]:g}'
+
+    for name in library.names(library.SOILS):
+        soil = SoilClass.named(name)
+        yield (f'`{name}`: {soil.means}', span(soil.shear_wave_velocity),
+               span(soil.poisson_ratio), span(soil.density), span(soil.damping_ratio))
+    for name in library.names(library.BEARINGS):
+        found = library.bearing(name, diameter=0.1, load=2000.0, speed=100.0)
+        yield (f'`{name}`: {library.entries(library.BEARINGS)[name]["means"]}',
+               f'{found.stiffness["xx"]:.2g}', f'{found.stiffness["zz"]:.2g}',
+               f'{found.damping["zz"]:.2g}', f'{found.stiffness_factor:g}',
+               f'{found.damping_factor:g}')
+    for name in library.names(library.PEDESTALS):
+        own = PedestalKind.named(name)
+        yield (f'`{name}`: {own.means}', f'{own.stiffness["xx"]:.2g}',
+               f'{own.stiffness["zz"]:.2g}', f'{own.damping_ratio:g}', f'{own.mass_share:g}',
+               f'{own.stiffness_factor:g}')
+    for name in library.names(library.MACHINES):
+        kind = MachineKind.named(name)
+        yield f'`{name}`: {kind.means}', kind.grade, kind.bearing, kind.pedestal
+    for name in library.names('materials'):
+        steel = library.material(name)
+        yield (f'`{name}`', f'{1e-9 * steel.young_modulus:g}', f'{steel.poisson_ratio:g}',
+               f'{steel.density:g}')
+
+
+def test_every_table_of_the_library_is_that_of_its_files():
+    lines = PAGE.read_text().splitlines()
+    said = {line for line in lines if line.startswith('| `')}
+    assert said == {f'| {" | ".join(row)} |' for row in rows()}
