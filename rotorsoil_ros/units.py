@@ -1,5 +1,6 @@
 """How user units become SI: the only place in which a 60 appears."""
 
+from dataclasses import dataclass
 import math
 from typing import TypeVar
 
@@ -54,3 +55,34 @@ def to_lag_deg(phase: FloatArray) -> FloatArray:
     # Of a tiny lead the remainder would round up to the full turn that it stands for.
     lag = np.mod(-np.degrees(phase), 360.0)
     return np.where(lag == 360.0, 0.0, lag)
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """
+    How quantities are said: in units of a plant, or in SI.
+
+    Attributes
+    ----------
+    are_of_plant : bool
+        rpm, um peak-to-peak and mm/s rms instead of rad/s, m zero-to-peak and m/s rms.
+
+    """
+
+    are_of_plant: bool = True
+
+    def speed(self, omega: float, digits: int = 6) -> str:
+        """Return a speed of so many digits in words."""
+        if self.are_of_plant:
+            return f'{rad_s_to_rpm(omega):.{digits}g} rpm'
+        return f'{omega:.{digits}g} rad/s'
+
+    def displacement(self, amplitude: float, unit: str = 'm') -> str:
+        """Return an amplitude, zero-to-peak [m], or [rad] if that is its unit, in words."""
+        if self.are_of_plant:
+            return f'{2e6 * amplitude:.4g} u{unit} p-p'
+        return f'{amplitude:.4g} {unit} zero-to-peak'
+
+    def velocity(self, rms: float) -> str:
+        """Return a velocity [m/s rms] in words."""
+        return f'{1e3 * rms:.3g} mm/s rms' if self.are_of_plant else f'{rms:.3g} m/s rms'

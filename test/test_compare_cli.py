@@ -26,6 +26,7 @@ from rotorsoil_ros.units import rpm_to_rad_s
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
+from house import sheets
 from records import import_run_up
 
 ROOT = Path(__file__).parents[1]
@@ -227,6 +228,10 @@ def test_identified_case_is_written_and_explains_the_run(tmp_path, capsys):
     assert 'soil.shear_modulus: factor 0.6' in said
     assert 'quote this one' in said
     assert load(written).soil.shear_modulus == pytest.approx(60e6, rel=0.03)
+    # The story of the case and its comments stay.
+    before, after = Path(FAN).read_text().splitlines(), written.read_text().splitlines()
+    assert set(before) - set(after) == {line for line in before if 'shear_modulus: 100' in line
+                                        or 'disc: wheel, moment' in line}
     assert load(written).unbalance[1] == pytest.approx(0.031j, rel=0.03)
     assert judged(log, written).verdict == Verdict.PASSES
 
@@ -265,6 +270,12 @@ def test_demonstration_without_a_plant_finds_what_was_put_in(tmp_path, capsys):
     found = summary(out)
     assert found['synthetic']
     assert 'SYNTHETIC' in (out / 'report.html').read_text().split('</h1>')[0]
+    page = (out / 'report.html').read_text()
+    soft = round(100.0 * (1.0 - factor))
+    assert f'ground {soft} % softer than in the case, unbalance of wheel grew by ' in page
+    assert 'look at wheel at the next stop' in found['next_step']
+    assert '<dt>quasi-static</dt>' in page
+    assert sheets(out / 'report.html', tmp_path) <= 3
 
 
 def test_rotor_kit_is_shown_as_it_is(kit_log, tmp_path, capsys):

@@ -1,25 +1,89 @@
 """What would the node have answered to a recorded profile? The same numbers, without a graph."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import math
 import os
 from pathlib import Path
 from typing import Protocol
+
+import numpy as np
 
 from rotorsoil_ros.bags.feed import feed, Inputs
 from rotorsoil_ros.bags.metadata import files
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import Event
+from rotorsoil_ros.events import Event, Predicted
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.health import Health
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.wire.messages import Encoder, Messenger, Records, Topics
 from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
+
+
+@dataclass(frozen=True, slots=True)
+class LargestAnswer:
+    """
+    Where a channel answered with more than anywhere else.
+
+    Attributes
+    ----------
+    channel : Channel
+        Which.
+    speed, amplitude : float
+        Of the rotor [rad/s], and of the displacement, zero-to-peak [m].
+
+    """
+
+    channel: Channel
+    speed: float
+    amplitude: float
+
+    @property
+    def velocity(self) -> float:
+        """Velocity [m/s rms]."""
+        return self.speed * self.amplitude / math.sqrt(2.0)
+
+
+class Largest:
+    """Keeps of all answers the largest displacement, and the largest velocity of each housing."""
+
+    def __init__(self, channels: tuple[Channel, ...]) -> None:
+        self._channels = channels
+        self._moved = [not channel.is_rotation for channel in channels]
+        self._housings = [column for column, channel in enumerate(channels)
+                          if channel.is_housing]
+        self.displacement: LargestAnswer | None = None
+        self.housings: dict[Channel, LargestAnswer] = {}
+        self.speeds = math.inf, -math.inf
+
+    def __call__(self, event: Event) -> None:
+        """Take an event; whatever is no answer is nothing."""
+        if not isinstance(event, Predicted):
+            return
+        size = np.abs(event.prediction.displacement)
+        known = np.isfinite(size).all(axis=1)
+        if not known.any():
+            return
+        speed, size = np.abs(event.prediction.speed[known]), size[known]
+        self.speeds = (min(self.speeds[0], float(speed.min())),
+                       max(self.speeds[1], float(speed.max())))
+        row, column = divmod(int(np.where(self._moved, size, 0.0).argmax()), size.shape[1])
+        own = LargestAnswer(self._channels[column], float(speed[row]), float(size[row, column]))
+        if self.displacement is None or own.amplitude > self.displacement.amplitude:
+            self.displacement = own
+        for column in self._housings:
+            row = int((speed * size[:, column]).argmax())
+            own = LargestAnswer(self._channels[column], float(speed[row]),
+                                float(size[row, column]))
+            before = self.housings.get(own.channel)
+            if before is None or own.velocity > before.velocity:
+                self.housings[own.channel] = own
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +101,10 @@ class Answered:
         What of the profile could not be read, and why.
     failure : str
         Why not one speed is answered; nothing where one is.
+    largest : Largest or None
+        What was answered with most.
+    natural_speeds : mapping of str to float
+        Lowest frequency of machine and support along x and z [rad/s], by which a zone goes.
 
     """
 
@@ -44,6 +112,8 @@ class Answered:
     counts: Counter[str]
     remarks: tuple[str, ...] = ()
     failure: str = ''
+    largest: Largest | None = None
+    natural_speeds: Mapping[str, float] = field(default_factory=dict)
 
 
 class Screen(Protocol):
@@ -113,13 +183,15 @@ def predict(
     with ExitStack() as stack:
         log = stack.enter_context(_Answers(out))
         viewer = [stack.enter_context(screen(name))] if screen else []
+        largest = Largest(machine.table.channels)
         encoder = Encoder(name, machine.table.channels, Topics.of(inputs.namespace, name))
         told = [Messenger(encoder, [log.write])] if out is not None else []
         heard = [listener] if listener is not None else []
-        monitor = Monitor(name, machine.table, unbalance, sinks=[*told, *viewer, *heard],
+        monitor = Monitor(name, machine.table, unbalance,
+                          sinks=[*told, largest, *viewer, *heard],
                           judging=Judging.of(machine.case))
-        monitor.judge.take_criteria(criteria(
-            machine.case, machine.model, unbalance, machine.directory))
+        expected = criteria(machine.case, machine.model, unbalance, machine.directory)
+        monitor.judge.take_criteria(expected)
         for each in heard:
             each.begin(monitor)
         done = 0
@@ -132,7 +204,8 @@ def predict(
         failure = _why_nothing(monitor.health)
         if not failure:
             log.keep()
-    return Answered(name, monitor.health.counts, tuple(inputs.remarks), failure)
+    return Answered(name, monitor.health.counts, tuple(inputs.remarks), failure, largest,
+                    dict(zip(ACROSS, expected.natural_speeds, strict=True)))
 
 
 class _Answers:

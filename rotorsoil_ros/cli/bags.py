@@ -1,18 +1,23 @@
 """Recorded profiles, answered offline or sent into the graph."""
 
 from argparse import Namespace
+from collections.abc import Iterator
 import os
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
 
 from rotorsoil_ros.case import config, document, ross
+from rotorsoil_ros.case.zone_limits import support_class, zone, ZoneLimits
 from rotorsoil_ros.cli.archive import is_archive, predict_archive
+from rotorsoil_ros.cli.arguments.options import SI
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.table import opened
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.units import Units
 
 if TYPE_CHECKING:
+    from rotorsoil_ros.bags.predict import Answered
     from rotorsoil_ros.wire.speeds import SpeedSource
 
 
@@ -47,9 +52,31 @@ def predict(arguments: Namespace) -> int:
     if answered.failure:
         print(f'{profile}: {answered.failure}', file=sys.stderr)
         return 1
-    counts = ', '.join(f'{number} {reason}' for reason, number in answered.counts.items())
-    print(f'{arguments.output}: {answered.machine}: {counts}')
+    counts = {reason: number for reason, number in answered.counts.items() if number}
+    told = ', '.join(f'{number} {reason}' for reason, number in counts.items())
+    print(f'{arguments.output}: {answered.machine}: {told}')
+    for line in _found(answered, machine.case.zones, Units(arguments.units != SI)):
+        print(line)
     return 0
+
+
+def _found(answered: 'Answered', zones: ZoneLimits, units: Units) -> Iterator[str]:
+    """Yield what was answered with most, and in which zones the housings are."""
+    largest = answered.largest
+    if largest is None or largest.displacement is None:
+        return
+    low, high = largest.speeds
+    yield f'speeds           {units.speed(low)} to {units.speed(high)}'
+    most = largest.displacement
+    yield (f'largest answer   {units.displacement(most.amplitude)} at {most.channel}, '
+           f'{units.speed(most.speed)}')
+    for channel, own in largest.housings.items():
+        if not own.amplitude > 0.0:
+            continue  # on rigid ground a housing does not move
+        support = support_class(answered.natural_speeds[channel.axis], own.speed)
+        yield (f'largest velocity {units.velocity(own.velocity)} at {channel}, '
+               f'{units.speed(own.speed)}: zone '
+               f'{zone(own.velocity, zones.of(support, own.speed))} ({support} support)')
 
 
 def replay(arguments: Namespace) -> int:

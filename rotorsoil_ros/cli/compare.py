@@ -1,12 +1,13 @@
 """Predicted against measured: what a vibration engineer acts on."""
 
 from argparse import Namespace
-from collections.abc import Iterator
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.zone_limits import ISO_10816_3
+from rotorsoil_ros.cli.arguments.options import SI
 from rotorsoil_ros.cli.bags import speed_source
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import InputError, RotorSoilError
@@ -14,6 +15,9 @@ from rotorsoil_ros.figures.report import (
     channel_table,
     exclusions,
     peak_table,
+    PLANT_SCALE,
+    Scale,
+    SI_SCALE,
     write_report,
     zone_table,
 )
@@ -21,6 +25,9 @@ from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.rules import Matching
 from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rpm_to_rad_s
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.monitor.identification.case import Identification
 
 _VERDICT_FAILS = 1
 
@@ -41,14 +48,15 @@ def compare(arguments: Namespace) -> int:
     with progress('comparing') as report:
         comparison = judged(arguments.log, _case(arguments), wish,
                             cache_directory=arguments.cache, progress=report)
-    lines = list(_identification(arguments, comparison))
+    found, lines = _identification(arguments, comparison)
     out: Path = arguments.output
     out.mkdir(parents=True, exist_ok=True)
-    _print(comparison)
+    _print(comparison, SI_SCALE if arguments.units == SI else PLANT_SCALE)
     for line in lines:
         print(line)
     with progress('drawing') as _:
-        write_report(comparison, out, source=str(arguments.log), identification=lines)
+        write_report(comparison, out, source=str(arguments.log), identification=lines,
+                     found=found)
     print(f'report    {out / "report.html"}')
     print(f'verdict   {comparison.verdict}')
     return 0 if comparison.verdict == Verdict.PASSES else _VERDICT_FAILS
@@ -63,11 +71,14 @@ def _case(arguments: Namespace) -> Case | None:
     return None
 
 
-def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[str]:
+def _identification(
+    arguments: Namespace, comparison: Comparison,
+) -> 'tuple[Identification | None, list[str]]':
+    """Return what explains the run, and that in words; nothing where nobody asked."""
     if not (arguments.identify or arguments.identify_unbalance):
         if arguments.write_case is not None:
             raise InputError('--write-case: needs --identify or --identify-unbalance')
-        return
+        return None, []
     from rotorsoil_ros.monitor.identification.case import identify_case, Wanted
     from rotorsoil_ros.monitor.identification.words import describe, write_case
 
@@ -81,17 +92,17 @@ def _identification(arguments: Namespace, comparison: Comparison) -> Iterator[st
         except RotorSoilError as error:
             if isinstance(error, InputError):
                 raise
-            yield f'identification refused: {error}'
-            return
-    yield from describe(found)
+            return None, [f'identification refused: {error}']
+    lines = list(describe(found))
     if arguments.write_case is not None:
         write_case(found, arguments.write_case)
-        yield f'updated case {arguments.write_case}'
+        lines.append(f'updated case {arguments.write_case}')
+    return found, lines
 
 
-def _print(comparison: Comparison) -> None:
-    for header, lines in (channel_table(comparison), peak_table(comparison),
-                          zone_table(comparison)):
+def _print(comparison: Comparison, scale: Scale) -> None:
+    for header, lines in (channel_table(comparison, scale), peak_table(comparison, scale),
+                          zone_table(comparison, scale)):
         if lines:
             widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
             for line in (header, *lines):

@@ -55,7 +55,8 @@ def demonstrate_comparison(out: Path, directory: Path, *, start_ns: int) -> None
         with progress('identifying') as _:
             found = identify_case(comparison, _WANTED)
         with progress('drawing') as _:
-            write_report(comparison, out, source=str(log), identification=list(describe(found)))
+            write_report(comparison, out, source=str(log), identification=list(describe(found)),
+                         found=found)
     _print(found, comparison, start_ns=start_ns)
     print(f'verdict   {_verdict(comparison)}')
     print(f'report    {out / "report.html"}')

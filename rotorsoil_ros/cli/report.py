@@ -23,6 +23,7 @@ from rotorsoil_ros.case.summary import (
     unstable,
     warnings,
 )
+from rotorsoil_ros.cli.arguments.options import SI
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError
@@ -35,7 +36,7 @@ from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.peaks import Peak, resonances
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, Units
 
 # Amplification factor below which a critical speed needs no margin (API 617).
 _FELT = 2.5
@@ -44,12 +45,13 @@ _FELT = 2.5
 def check(arguments: Namespace) -> int:
     """Print what follows from a case, where it is critical, and what looks odd."""
     case = load(arguments.case, arguments.overrides, cache_directory=arguments.cache)
+    units = Units(arguments.units != SI)
     directory = cache.directory(arguments.cache)
     with progress('solving') as _:
         model = models.coupled_model(case, directory)
         table = models.response_table(case, model, directory)
         try:
-            criticals, doubts = _criticals(case, model)
+            criticals, doubts = _criticals(case, model, units)
         except NotSolvedError as error:
             # The machine can be answered for all the same: its response needs no modes.
             criticals = [('critical speeds', 'not known, see the warning')]
@@ -58,10 +60,10 @@ def check(arguments: Namespace) -> int:
             doubts += near_threshold(case, stability(
                 model, (case.speed_range[0], BEYOND * case.speed_range[1])))
     _print_table(derived_quantities(case, model.soil_models))
-    _print_table(_stability(table.stability))
+    _print_table(_stability(table.stability, units))
     _print_table(criticals)
     peaks = _peaks(case, table)
-    _print_table(_of_peaks(peaks))
+    _print_table(_of_peaks(peaks, units))
     _print_table(_of_damping(case, model, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
@@ -145,22 +147,22 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
     yield f'{block}: file', str(cache.Cache(directory).path('compliance', models.key_of(soil)))
 
 
-def _stability(found: Stability) -> Iterable[tuple[str, str]]:
-    low, high = (rad_s_to_rpm(speed) for speed in found.span)
+def _stability(found: Stability, units: Units) -> Iterable[tuple[str, str]]:
+    low, high = (units.speed(speed) for speed in found.span)
     if found.doubt:
         yield 'stability', 'not known, see the warning'
     elif found.instabilities:
-        ranges = ', '.join(f'{rad_s_to_rpm(start):.6g} to {rad_s_to_rpm(end):.6g} rpm'
+        ranges = ', '.join(f'{units.speed(start)} to {units.speed(end)}'
                            for start, end in found.unstable.tolist())
         yield 'stability', f'UNSTABLE, {ranges}: no steady response there, see the errors'
     else:
         how = 'no bearing gives energy' if not found.highest else (
             f'every mode up to {rad_s_to_hz(found.highest):.4g} Hz decays')
-        yield 'stability', f'stable from {low:g} to {high:g} rpm: {how}'
+        yield 'stability', f'stable from {low} to {high}: {how}'
 
 
 def _criticals(
-    case: Case, model: CoupledModel,
+    case: Case, model: CoupledModel, units: Units,
 ) -> tuple[list[tuple[str, str]], list[str]]:
     """Return every critical speed to which the speed range has to keep a margin, and doubts."""
     low, high = case.speed_range
@@ -179,11 +181,11 @@ def _criticals(
             asks = critical.required_margin(high)
             how.append(f'{critical.speed / high - 1.0:.1%} above the speed range, '
                        + (f'{asks:.0%} is asked' if asks else 'no margin is asked'))
-        lines.append((f'critical speed {rad_s_to_rpm(critical.speed):.6g} rpm',
+        lines.append((f'critical speed {units.speed(critical.speed)}',
                       f'{", ".join(how)}, {names.of_critical(critical)}'))
     if not lines:
-        lines.append(('critical speeds', f'none from {rad_s_to_rpm(span[0]):g} up to '
-                                         f'{rad_s_to_rpm(span[1]):.6g} rpm'))
+        lines.append(('critical speeds', f'none from {units.speed(span[0])} up to '
+                                         f'{units.speed(span[1])}'))
     return lines, clipped(span, wanted)
 
 
@@ -192,10 +194,10 @@ def _peaks(case: Case, table: ResponseTable) -> list[Peak]:
     return resonances(table.predictor(case.unbalance), moved)
 
 
-def _of_peaks(peaks: Sequence[Peak]) -> Iterable[tuple[str, str]]:
+def _of_peaks(peaks: Sequence[Peak], units: Units) -> Iterable[tuple[str, str]]:
     for peak in peaks:
-        yield (f'response peak {rad_s_to_rpm(peak.speed):.6g} rpm',
-               f'{1e6 * peak.amplitude:.4g} um zero-to-peak at {peak.channel}')
+        yield (f'response peak {units.speed(peak.speed)}',
+               f'{units.displacement(peak.amplitude)} at {peak.channel}')
     if not peaks:
         yield 'peaks of the response', 'none in the speed range'
 

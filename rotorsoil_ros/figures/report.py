@@ -1,7 +1,8 @@
 """A comparison on one page that needs nothing beside it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 import csv
+from dataclasses import dataclass
 from html import escape
 import io
 import json
@@ -9,12 +10,12 @@ import math
 from pathlib import Path
 import re
 
-import numpy as np
-
 import rotorsoil_ros
 from rotorsoil_ros.figures import html
 from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
 from rotorsoil_ros.monitor.comparison import Comparison
+from rotorsoil_ros.monitor.identification.case import Identification
+from rotorsoil_ros.monitor.identification.sentence import in_a_sentence
 from rotorsoil_ros.monitor.passage import Passage
 from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.units import rad_s_to_rpm
@@ -22,17 +23,57 @@ from rotorsoil_ros.units import rad_s_to_rpm
 _DPI = 110
 _LONGEST_NAME = 100
 
-_KINDS = {Verdict.PASSES: 'good', Verdict.FAILS: 'bad', Verdict.UNDECIDED: 'open'}
 
-_WORDS = {
-    Verdict.PASSES: 'The machine behaves as predicted.',
-    Verdict.FAILS: 'The machine does not behave as predicted.',
-    Verdict.UNDECIDED: 'Nothing could be held against the prediction.',
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """In which units tables are, and by what SI is multiplied for them; amplitudes 0-peak."""
+
+    length: float = 1.0
+    length_unit: str = 'm'
+    angle: float = 1.0
+    angle_unit: str = 'rad'
+    speed: float = 1.0
+    speed_unit: str = 'rad/s'
+    velocity: float = 1.0
+    velocity_unit: str = 'm/s'
+
+
+SI_SCALE = Scale()
+PLANT_SCALE = Scale(1e6, 'um', math.degrees(1.0), 'deg', rad_s_to_rpm(1.0), 'rpm', 1e3, 'mm/s')
+
+# Pictures that are printed: with the tables they fill three sheets.
+_MOST_PRINTED = 6
+
+_STYLE = """
+@page { size: A4; margin: 10mm; }
+@media print { body { font-size: 10px; line-height: 1.25; } h1 { font-size: 15px; }
+  h2 { font-size: 12px; margin: 6px 0 2px; } th, td { font-size: 8px; padding: 0 3px; }
+  ul, dl, pre, figcaption, .small { font-size: 8.5px; } .verdict { font-size: 12px; }
+  .pictures { grid-template-columns: 1fr 1fr; gap: 4px; } .screen { display: none; }
+  figure img { max-height: 78mm; object-fit: contain; } }
+"""
+
+# What the words of the page mean, for who does not compare machines every day.
+_TERMS = {
+    '1X': 'vibration once per turn; unbalance makes nothing else',
+    'band': 'between which amplitudes the machine lies, as far as its soil, bearings and models '
+            'are known',
+    'bias, scatter': 'mean and standard deviation of measured less predicted amplitude',
+    'ratio': 'measured over predicted amplitude',
+    'R^2': 'share of the measured vectors that the prediction explains, 1 at best',
+    'quasi-static': 'the speed changes so slowly that the machine answers as at constant speed',
+    'p': 'how fast a resonance was passed: below 0.1 slowly, above 1 fast',
+    'zones': 'of ISO 10816-3: A as new, B good for years, C only for a while, D does harm',
+    'support': 'rigid where the lowest natural frequency lies above 1.25 times the speed',
 }
+
+_KINDS = {Verdict.PASSES: 'good', Verdict.FAILS: 'bad', Verdict.UNDECIDED: 'open'}
 
 
 def write_report(
     comparison: Comparison, out: Path, *, source: str, identification: Sequence[str] = (),
+    found: Identification | None = None,
 ) -> None:
     """
     Write tables, pictures and the report of a comparison into a directory.
@@ -47,13 +88,17 @@ def write_report(
         Which log was read.
     identification : sequence of str
         What identification says.
+    found : Identification or None
+        What it found, for the sentence on top.
 
     """
+    said, advice = in_a_sentence(comparison, found)
     with (out / 'comparison.csv').open('w', encoding='utf-8', newline='') as stream:
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(HEADER)
         writer.writerows(rows(comparison))
-    content = {**document(comparison), 'log': source, 'identification': list(identification)}
+    content = {**document(comparison), 'log': source, 'identification': list(identification),
+               'sentence': said, 'next_step': advice}
     (out / 'comparison.json').write_text(
         json.dumps(content, indent=1, allow_nan=False) + '\n', encoding='utf-8')
     pictures: list[tuple[str, bytes]] = []
@@ -63,7 +108,7 @@ def write_report(
         (out / f'{_file_name(name, len(pictures))}.png').write_bytes(stream_of.getvalue())
         pictures.append((caption, stream_of.getvalue()))
     (out / 'report.html').write_text(
-        page(comparison, pictures, source=source, identification=identification),
+        page(comparison, pictures, source=source, identification=identification, found=found),
         encoding='utf-8')
 
 
@@ -75,7 +120,7 @@ def _file_name(name: str, number: int) -> str:
 
 def page(
     comparison: Comparison, pictures: Iterable[tuple[str, bytes]], *, source: str,
-    identification: Sequence[str] = (),
+    identification: Sequence[str] = (), found: Identification | None = None,
 ) -> str:
     """
     Return the report as HTML.
@@ -90,16 +135,20 @@ def page(
         Which log was read.
     identification : sequence of str
         What identification printed.
+    found : Identification or None
+        What it found.
 
     """
     verdict = comparison.verdict
+    said, advice = in_a_sentence(comparison, found)
     title = f'{comparison.run.title}: predicted against measured'
     case = comparison.expectation.case
     parts = [
         f'<h1>{escape(title)}</h1>',
         f'<p>Log {escape(source)}; case {escape(case.name)}, {escape(str(case.path))}; '
         f'rotorsoil_ros {rotorsoil_ros.__version__}.</p>',
-        html.verdict(_KINDS[verdict], str(verdict), _WORDS[verdict], comparison.failures),
+        html.verdict(_KINDS[verdict], str(verdict), f'{said}.', comparison.failures),
+        f'<p><b>Next step.</b> {escape(advice)}.</p>',
     ]
     if comparison.remarks:
         parts.append(f'<h2>To be known</h2>{html.listed(comparison.remarks)}')
@@ -119,48 +168,70 @@ def page(
     if identification:
         text = escape('\n'.join(identification))
         parts += ['<h2>Identification</h2>', f'<pre>{text}</pre>']
-    parts.append('<h2>Pictures</h2><div class="pictures">')
-    parts += [html.png(image, caption) for caption, image in pictures]
-    parts.append('</div>')
-    return html.page(title, parts)
+    parts += ['<h2>Pictures</h2><div class="pictures">', *_shown(pictures), '</div>',
+              '<h2>Words</h2><dl>', *(f'<dt>{escape(word)}</dt><dd>{escape(meaning)}</dd>'
+                                      for word, meaning in _TERMS.items()), '</dl>']
+    return html.page(title, parts, style=_STYLE)
 
 
-def channel_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+def _shown(pictures: Iterable[tuple[str, bytes]]) -> Iterator[str]:
+    """Yield all pictures; those that tell most are printed too."""
+    # Trend and residuals tell of all channels.
+    ordered = sorted(pictures, key=lambda one: ': ' in one[0])
+    for number, (caption, image) in enumerate(ordered):
+        kind = '' if number < _MOST_PRINTED else ' class="screen"'
+        yield f'<div{kind}>{html.png(image, caption)}</div>'
+    if len(ordered) > _MOST_PRINTED:
+        yield '<p class="small">More pictures are on screen, and as PNG beside the page.</p>'
+
+
+def channel_table(
+    comparison: Comparison, scale: Scale = PLANT_SCALE,
+) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of what was found, channel by channel."""
-    header = ['channel', 'points', 'used', 'bias [um]', 'scatter [um]', 'ratio',
-              'phase bias [deg]', 'phase scatter [deg]', 'R^2', 'inside band [%]']
+    length, angle = f'[{scale.length_unit}]', f'[{scale.angle_unit}]'
+    header = ['channel', 'points', 'used', f'bias {length}', f'scatter {length}', 'ratio',
+              f'phase bias {angle}', f'phase scatter {angle}', 'R^2', 'inside band [%]']
     rows = [[points.channel, str(len(points.stamp_ns)), str(int(points.used.sum())),
-             _number(1e6 * figures.bias), _number(1e6 * figures.scatter), _number(figures.ratio),
-             _number(np.rad2deg(figures.phase_bias)), _number(np.rad2deg(figures.phase_scatter)),
+             _number(scale.length * figures.bias), _number(scale.length * figures.scatter),
+             _number(figures.ratio), _number(scale.angle * figures.phase_bias),
+             _number(scale.angle * figures.phase_scatter),
              _number(figures.r_squared), _number(100.0 * figures.inside)]
             for points, figures in zip(comparison.points, comparison.statistics, strict=True)]
     return header, rows
 
 
-def peak_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+def peak_table(
+    comparison: Comparison, scale: Scale = PLANT_SCALE,
+) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of predicted beside measured peaks."""
-    header = ['channel', 'predicted [rpm]', 'measured [rpm]', 'deviation [%]', 'predicted [um]',
-              'allowed [um]', 'measured [um]', 'passed at [rpm/s]', 'p', 'quasi-static']
+    speed, length = f'[{scale.speed_unit}]', f'[{scale.length_unit}]'
+    header = ['channel', f'predicted {speed}', f'measured {speed}', 'deviation [%]',
+              f'predicted {length}', f'allowed {length}', f'measured {length}',
+              f'passed at [{scale.speed_unit}/s]', 'p', 'quasi-static']
     rows = []
     for peak in comparison.peaks:
         passed = peak.measured or peak.predicted
         assert passed is not None
-        rows.append([peak.channel, _speed(peak.predicted), _speed(peak.measured),
-                     _number(100.0 * peak.deviation), _height(peak.predicted),
-                     _number(1e6 * peak.allowed.most), _height(peak.measured),
-                     _number(float(rad_s_to_rpm(passed.rate))),
+        rows.append([peak.channel, _speed(peak.predicted, scale), _speed(peak.measured, scale),
+                     _number(100.0 * peak.deviation), _height(peak.predicted, scale),
+                     _number(scale.length * peak.allowed.most), _height(peak.measured, scale),
+                     _number(scale.speed * passed.rate),
                      _number(passed.number(peak.damping_ratio)),
                      'yes' if peak.is_slow else 'no'])
     return header, rows
 
 
-def zone_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+def zone_table(
+    comparison: Comparison, scale: Scale = PLANT_SCALE,
+) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the zones of the housings."""
-    header = ['channel', 'source', 'zone', 'velocity [mm/s rms]', 'speed [rpm]', 'support',
-              'limits [mm/s]', 'constant speed']
-    rows = [[entry.channel, entry.source, entry.zone, _number(1e3 * entry.velocity),
-             f'{rad_s_to_rpm(entry.speed):.0f}', entry.support,
-             ' / '.join(f'{1e3 * limit:g}' for limit in entry.limits),
+    header = ['channel', 'source', 'zone', f'velocity [{scale.velocity_unit} rms]',
+              f'speed [{scale.speed_unit}]', 'support', f'limits [{scale.velocity_unit}]',
+              'constant speed']
+    rows = [[entry.channel, entry.source, entry.zone, _number(scale.velocity * entry.velocity),
+             f'{scale.speed * entry.speed:.4g}', entry.support,
+             ' / '.join(f'{scale.velocity * limit:g}' for limit in entry.limits),
              'yes' if entry.is_steady else 'no'] for entry in comparison.zones]
     return header, rows
 
@@ -176,9 +247,9 @@ def _number(value: float) -> str:
     return '-' if math.isnan(value) else f'{value:.3g}'
 
 
-def _speed(passage: Passage | None) -> str:
-    return '-' if passage is None else f'{rad_s_to_rpm(passage.speed):.0f}'
+def _speed(passage: Passage | None, scale: Scale) -> str:
+    return '-' if passage is None else f'{scale.speed * passage.speed:.5g}'
 
 
-def _height(passage: Passage | None) -> str:
-    return '-' if passage is None else _number(1e6 * passage.amplitude)
+def _height(passage: Passage | None, scale: Scale) -> str:
+    return '-' if passage is None else _number(scale.length * passage.amplitude)

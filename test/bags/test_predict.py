@@ -71,6 +71,17 @@ def test_every_speed_is_answered_at_its_stamp_with_what_the_table_says(tmp_path,
     assert answered.machine == 'fan'
     assert answered.counts['answered'] == np.count_nonzero(known)
     assert answered.counts['nan'] == 1
+    # What it found: the largest of what was logged.
+    moved = [not channel.is_rotation for channel in machine.table.channels]
+    sizes = np.where(moved, np.abs(exact.displacement), 0.0)
+    most = answered.largest.displacement
+    assert most.amplitude == pytest.approx(sizes.max(), rel=1e-12)
+    row, column = np.unravel_index(sizes.argmax(), sizes.shape)
+    assert (most.channel, most.speed) == (machine.table.channels[column], speeds[known][row])
+    assert answered.largest.speeds == (speeds[known].min(), speeds[known].max())
+    for channel, own in answered.largest.housings.items():
+        velocity = np.abs(exact.velocity)[:, machine.table.channels.index(channel)]
+        assert own.velocity == pytest.approx(velocity.max() / 2.0**0.5, rel=1e-12)
 
 
 def test_the_log_holds_profile_answers_model_and_diagnostics(tmp_path, machine, run_up):

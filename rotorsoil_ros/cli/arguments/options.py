@@ -149,10 +149,13 @@ def add_table_output(verb: argparse.ArgumentParser, *, acts: bool = False) -> No
     add_units(verb)
 
 
-def add_units(verb: argparse.ArgumentParser) -> None:
+def add_units(verb: argparse.ArgumentParser, *, printed: bool = False) -> None:
+    """Add the units of a table, or of what is printed for people."""
+    one, other = (' (default)', '') if printed else (' (default on a terminal)',
+                                                    ' (default in files)')
     verb.add_argument('--units', choices=(PLANT, SI),
-                      help='plant: um peak-to-peak, mm/s rms, rpm, Hz, degrees of lag (default on '
-                           'a terminal); si: m, rad, rad/s (default in files)')
+                      help=f'plant: um peak-to-peak, mm/s rms, rpm, Hz, degrees of lag{one}; '
+                           f'si: m, rad, rad/s{other}')
 
 
 def add_speed(verb: argparse.ArgumentParser) -> None:

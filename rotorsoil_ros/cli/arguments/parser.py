@@ -10,6 +10,7 @@ from rotorsoil_ros.cli.arguments.options import (
     add_output,
     add_speed,
     add_table_output,
+    add_units,
     add_verb,
     MULTIPLE,
     number_of,
@@ -64,8 +65,9 @@ def _add_new(verbs: Verbs) -> None:
 
 def _add_case_verbs(verbs: Verbs) -> None:
     _add_new(verbs)
-    add_verb(verbs, 'check', 'report:check',
-          'validate a case; print its derived quantities and warnings')
+    add_units(add_verb(verbs, 'check', 'report:check',
+                       'validate a case; print its derived quantities and warnings'),
+              printed=True)
     report = add_verb(verbs, 'report', 'report:report',
                    'judge on one page whether the foundation is right for the machine')
     report.add_argument('--rpm', metavar='R', type=RPM, required=True,
@@ -171,6 +173,7 @@ def _add_predict(verbs: Verbs) -> None:
     add('profiles', metavar='PROFILE', type=Path, nargs='+', help='MCAP file or bag')
     add_output(predict, 'OUT', 'log to write; of several profiles a directory, in which only '
                 'what is new or has changed is answered again', required=False)
+    add_units(predict, printed=True)
     add('--rrd', metavar='OUT.rrd', type=Path, help='recording for the rerun viewer')
     add('--statistics', metavar='X.parquet', type=Path,
         help='table to write of every minute and channel, .parquet or .csv; without -o '
@@ -211,6 +214,7 @@ def _add_compare(verbs: Verbs) -> None:
     add_output(compare, 'DIR', 'directory for tables, pictures and report',
                 default='comparison')
     compare.set_defaults(outputs=('output', 'write_case'))
+    add_units(compare, printed=True)
     add('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append', default=[],
         help='override the case file; may be repeated')
     add('--cache', metavar='DIR', type=Path, help='directory of computed tables')
