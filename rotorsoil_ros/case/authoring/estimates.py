@@ -8,7 +8,7 @@ import math
 from scipy.optimize import brentq
 
 from rotorsoil_ros.case.authoring import library
-from rotorsoil_ros.case.authoring.library import Coefficients, MachineKind, PedestalKind, SoilClass
+from rotorsoil_ros.case.authoring.library import BearingKind, MachineKind, PedestalKind, SoilClass
 from rotorsoil_ros.case.authoring.questions import Answers, SOURCE
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.units import GRAVITY, rpm_to_rad_s
@@ -23,6 +23,8 @@ _WIDEST_SOIL = 4.0
 _BLOCK_MASS_FACTOR = 1.05
 # Between which a shaft is looked for [m], and the share of a told rotor that is no shaft.
 _DIAMETERS, _LEAST_DISC = (1e-4, 30.0), 0.05
+# Of a shaft on films, over its overhang.
+_SPAN_ON_FILMS = 4.0
 # Below and beyond the shaft's outer stations, over its diameter.
 _COUPLING_SEAT, _END = 1.5, 1.0
 
@@ -94,6 +96,8 @@ class Estimates:
     def span(self) -> Known:
         """Distance of the bearings [m]."""
         usual = max(self.kind.span * self.disc_diameter, 0.15)
+        if self.bearing.film:  # a journal must not be lifted by what hangs over the other
+            usual = max(usual, _SPAN_ON_FILMS * self.overhang.value)
         if self.answers.block_length is not None:
             usual = min(usual, self.answers.block_length / _LENGTH_OVER_SPAN)
         return told_or(self.answers.bearing_span, usual,
@@ -232,11 +236,15 @@ class Estimates:
         """Mass that each bearing carries [kg]."""
         return 0.5 * self.rotor_mass
 
+    @cached_property
+    def bearing(self) -> BearingKind:
+        """What the bearings are like."""
+        return BearingKind.named(self.answers.bearing or self.kind.bearing)
+
     @property
-    def bearing(self) -> Coefficients:
-        """Stiffness and damping of each bearing."""
-        return library.bearing(self.answers.bearing or self.kind.bearing, speed=self.speed,
-                               diameter=self.shaft_diameter.value, load=GRAVITY * self.carried)
+    def bearing_load(self) -> float:
+        """Weight on each bearing, evenly [N]."""
+        return GRAVITY * self.carried
 
     @property
     def pedestal(self) -> PedestalKind | None:

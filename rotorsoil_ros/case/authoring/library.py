@@ -1,7 +1,7 @@
 """What is typical of soils, bearings, pedestals and kinds of machines, with how far it spreads."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 import math
@@ -59,60 +59,65 @@ class SoilClass:
 
 
 @dataclass(frozen=True, slots=True)
-class Coefficients:
+class BearingKind:
     """
-    What a bearing is like, and how far that spreads.
+    What a type of bearings is like, and how far that spreads.
 
     Attributes
     ----------
-    stiffness, damping : mapping of str to float
-        Over xx, zz and, of an oil film, xz and zx [N/m], [N s/m].
-    is_film : bool
-        Whether the damping is that at one speed and falls as this grows.
+    means : str
+        What it is.
     stiffness_factor, damping_factor : float
         Either may be off by such a factor [-].
+    constant, elements, size_per_bore, powers, across_over_up, damping_time
+        Of a rolling bearing: k = constant n^a s^b W^c up, a share of it across, damping [s].
+    film : mapping
+        Type and pads of an oil film, as a case has them; empty of a rolling bearing.
+    clearance_per_diameter, length_per_diameter : float
+        Of a film: radial clearance and length over the diameter [-].
+    oil : mapping
+        Of a film, as a case has it.
 
     """
 
-    stiffness: Mapping[str, float]
-    damping: Mapping[str, float]
-    is_film: bool
+    means: str
     stiffness_factor: float
     damping_factor: float
+    constant: float = 0.0
+    elements: int = 0
+    size_per_bore: float = 0.0
+    powers: Mapping[str, float] = field(default_factory=dict)
+    across_over_up: float = 1.0
+    damping_time: float = 0.0
+    film: Mapping[str, Any] = field(default_factory=dict)
+    clearance_per_diameter: float = 0.0
+    length_per_diameter: float = 0.0
+    oil: Mapping[str, Any] = field(default_factory=dict)
 
+    @classmethod
+    def named(cls, name: str) -> 'BearingKind':
+        """Return the type of this name."""
+        return cls(**entries(BEARINGS)[name])
 
-def bearing(name: str, *, diameter: float, load: float, speed: float) -> Coefficients:
-    """
-    Return what a bearing of a type is like.
+    def stiffness(self, *, diameter: float, load: float) -> dict[str, float]:
+        """Return xx and zz [N/m] of a rolling bearing on a shaft [m] under a load [N]."""
+        up = self.constant * math.prod((
+            self.elements ** self.powers['elements'],
+            (self.size_per_bore * diameter) ** self.powers['size'],
+            load ** self.powers['load']))
+        return {'xx': self.across_over_up * up, 'zz': up}
 
-    Parameters
-    ----------
-    name : str
-        Of its type.
-    diameter : float
-        Of the shaft in it [m].
-    load : float
-        Static, downward [N].
-    speed : float
-        Of the rotor [rad/s].
+    def damping(self, *, diameter: float, load: float) -> dict[str, float]:
+        """Return xx and zz [N s/m] of a rolling bearing."""
+        return {key: self.damping_time * value
+                for key, value in self.stiffness(diameter=diameter, load=load).items()}
 
-    """
-    entry = entries(BEARINGS)[name]
-    spread = entry['stiffness_factor'], entry['damping_factor']
-    if 'constant' not in entry:
-        clearance = entry['clearance_per_diameter'] * diameter
-        return Coefficients(
-            {key: value * load / clearance for key, value in entry['stiffness'].items()},
-            {key: value * load / (clearance * speed) for key, value in entry['damping'].items()},
-            True, *spread)
-    powers = entry['powers']
-    up = entry['constant'] * math.prod((
-        entry['elements'] ** powers['elements'],
-        (entry['size_per_bore'] * diameter) ** powers['size'], load ** powers['load']))
-    stiffness = {'xx': entry['across_over_up'] * up, 'zz': up}
-    return Coefficients(
-        stiffness, {key: entry['damping_time'] * value for key, value in stiffness.items()},
-        False, *spread)
+    def journal(self, diameter: float) -> dict[str, Any]:
+        """Return the geometry of an oil film about a shaft [m], as a case has it."""
+        sizes = {'diameter': diameter, 'length': self.length_per_diameter * diameter,
+                 'radial_clearance': self.clearance_per_diameter * diameter}
+        return {**self.film, **{key: float(f'{value:.3g}') for key, value in sizes.items()},
+                'oil': dict(self.oil)}
 
 
 @dataclass(frozen=True, slots=True)

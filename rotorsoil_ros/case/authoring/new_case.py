@@ -15,8 +15,8 @@ MARK = '# guess'
 
 # Speeds that a case covers, over the rated one, and finite elements of its shaft.
 _LOWEST, _HIGHEST, _ELEMENTS = 0.2, 1.3, 12
-# Speeds of a table of a film, each 1.4 times the one before: to three times the rated one.
-_FILM_SPEEDS = 9
+# On oil films: below, they are thinner than any that carries.
+_LOWEST_ON_FILMS = 0.5
 # ISO 10816-3: group 1 above this power [kW].
 _LARGE = 300.0
 _COMMENT_COLUMN = 46
@@ -48,7 +48,7 @@ def text_of(answers: Answers, *, command: str) -> str:
         '# of `uncertainty`, which says how far each guess may be off. Axes: x across, y along',
         '# the shaft, z up. SI units; "140 mm" or "100 MPa" may be written too.']
     body = [f'name: {name}', *_ground(found), *_foundation(found), *_rotor(found),
-            *_unbalance(found), *_spread(found), *_limits(answers)]
+            *_unbalance(found), *_spread(found), *_limits(found)]
     text = '\n'.join([*head, *body]) + '\n'
     # What is written has to load.
     config.case_of(Path(name), document.parse(text, source=name))
@@ -104,19 +104,20 @@ def _support(found: Estimates) -> str:
     soil = Soil(density * found.wave_velocity.value**2, 0.3, density)
     try:
         config.infinite_range(soil, Rectangle(0.5 * width.value, 0.5 * length.value), 'disc',
-                              _speeds(found.answers))
+                              _speeds(found))
     except RotorSoilError:
         return 'cone'
     return 'infinite_elements'
 
 
-def _speeds(answers: Answers) -> tuple[float, float]:
-    low, high = _speeds_rpm(answers)
+def _speeds(found: Estimates) -> tuple[float, float]:
+    low, high = _speeds_rpm(found)
     return float(rpm_to_rad_s(low)), float(rpm_to_rad_s(high))
 
 
-def _speeds_rpm(answers: Answers) -> tuple[float, float]:
-    return float(f'{_LOWEST * answers.rpm:.2g}'), float(f'{_HIGHEST * answers.rpm:.3g}')
+def _speeds_rpm(found: Estimates) -> tuple[float, float]:
+    rpm, lowest = found.answers.rpm, _LOWEST_ON_FILMS if found.bearing.film else _LOWEST
+    return float(f'{lowest * rpm:.2g}'), float(f'{_HIGHEST * rpm:.3g}')
 
 
 def _foundation(found: Estimates) -> Iterator[str]:
@@ -177,8 +178,13 @@ def _bearing(found: Estimates, name: str, position: str) -> Iterator[str]:
     why = f'a {kind} bearing of this size'
     yield f'    - name: {name}'
     yield position
-    yield _line(f'      stiffness: {_flow(own.stiffness)}', f'{MARK} [N/m]: {why}')
-    yield from _damping(found, f'{MARK} [N s/m]: {why}')
+    size = {'diameter': found.shaft_diameter.value, 'load': found.bearing_load}
+    if own.film:
+        journal = document.flow(own.journal(size['diameter']))
+        yield _line(f'      journal: {journal}', f'{MARK} [m]: {why}')
+    else:
+        yield _line(f'      stiffness: {_flow(own.stiffness(**size))}', f'{MARK} [N/m]: {why}')
+        yield _line(f'      damping: {_flow(own.damping(**size))}', f'{MARK} [N s/m]: {why}')
     pedestal = found.pedestal
     if pedestal is None:
         return
@@ -189,19 +195,6 @@ def _bearing(found: Estimates, name: str, position: str) -> Iterator[str]:
                 f'{MARK} [N/m]: {pedestal.means}')
     yield _line(f'        damping: {_flow(pedestal.damping(found.carried))}',
                 f'{MARK} [N s/m]: {pedestal.damping_ratio:g} of critical')
-
-
-def _damping(found: Estimates, comment: str) -> Iterator[str]:
-    own, rated = found.bearing, found.answers.rpm
-    if not own.is_film:
-        yield _line(f'      damping: {_flow(own.damping)}', comment)
-        return
-    # Of a film c Omega is constant. Beyond the range too: margins are looked for there.
-    shares = [_LOWEST * 2.0 ** (0.5 * step) for step in range(_FILM_SPEEDS)]
-    yield _line('      damping:', comment)
-    yield f'        speed_rpm: [{", ".join(_number(share * rated) for share in shares)}]'
-    for key, value in own.damping.items():
-        yield f'        {key}: [{", ".join(_number(value / share) for share in shares)}]'
 
 
 def _unbalance(found: Estimates) -> Iterator[str]:
@@ -217,9 +210,9 @@ def _spread(found: Estimates) -> Iterator[str]:
         yield _line(f'  {key}: {value:g}', f'# {why}')
 
 
-def _limits(answers: Answers) -> Iterator[str]:
-    group = 1 if answers.power_kw > _LARGE else 2
+def _limits(found: Estimates) -> Iterator[str]:
+    group = 1 if found.answers.power_kw > _LARGE else 2
     yield _line(f'zones: {{group: {group}}}',
                 f'# ISO 10816-3: {"above" if group == 1 else "up to"} {_LARGE:g} kW')
-    low, high = _speeds_rpm(answers)
+    low, high = _speeds_rpm(found)
     yield f'speed_range_rpm: [{low:g}, {high:g}]'
