@@ -114,7 +114,7 @@ def test_check_prints_what_follows_from_the_case(capsys, tmp_path):
     assert lines['block: mass over rotor mass'] == '10'
     forward = [name for name, value in lines.items()
                if name.startswith('critical') and value.startswith('forward')
-               and float(value.split('ratio ')[1].split(',')[0]) < 0.1]
+               and float(value.split('ratio ')[1].split()[0].rstrip(',')) < 0.1]
     # unbalance excites forward modes: both descriptions of the machine agree
     assert [float(name.split()[2]) for name in forward] == pytest.approx(
         [float(name.split()[2]) for name in lines if name.startswith('response peak')
