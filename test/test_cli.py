@@ -252,7 +252,7 @@ def test_plot_writes_every_picture(tmp_path, capsys):
     names = {Path(line).stem for line in capsys.readouterr().out.splitlines()}
     assert names == {'machine', 'support', 'bode_journals', 'bode_housings', 'bode_discs',
                      'bode_foundations', 'bode_rocking', 'orbits', 'shapes', 'campbell',
-                     'critical_shapes', 'polar', 'mass_ratios', 'compliance_block'}
+                     'critical_shapes', 'polar', 'mass_ratios', 'compliance_block', 'damping'}
     for path in (tmp_path / 'new' / 'plots').iterdir():
         assert path.read_bytes().startswith(b'\x89PNG')
 
