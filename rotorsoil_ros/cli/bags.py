@@ -2,8 +2,7 @@
 
 from argparse import Namespace
 from collections.abc import Iterator
-import os
-from pathlib import Path
+from contextlib import ExitStack
 import sys
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from rotorsoil_ros.case import config, document, ross
 from rotorsoil_ros.case.zone_limits import support_class, zone, ZoneLimits
 from rotorsoil_ros.cli.archive import is_archive, predict_archive
 from rotorsoil_ros.cli.arguments.options import SI
+from rotorsoil_ros.cli.outputs import replacing
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.table import opened
 from rotorsoil_ros.errors import InputError
@@ -43,10 +43,14 @@ def predict(arguments: Namespace) -> int:
     if arguments.output is None:
         raise InputError('-o OUT is missing: the log to write')
     [profile] = arguments.profiles
-    with progress('predicting') as report:
+    with ExitStack() as stack:
+        report = stack.enter_context(progress('predicting'))
+        rrd = arguments.rrd and stack.enter_context(replacing(arguments.rrd))
         answered = answer(machine, profile, arguments.output, progress=report,
                           speed=speed_source(arguments),
-                          screen=arguments.rrd and recorder(arguments.rrd, machine))
+                          screen=recorder(rrd, machine) if rrd else None)
+        if answered.failure and rrd:
+            rrd.unlink(missing_ok=True)
     for remark in answered.remarks:
         print(remark, file=sys.stderr)
     if answered.failure:
@@ -94,16 +98,8 @@ def recover(arguments: Namespace) -> int:
     """Save everything readable of a log whose writer was killed."""
     from rotorsoil_ros.bags.recover import recover as save
 
-    # What is replaced stays until the new one is complete.
-    out: Path = arguments.output
-    aside = out.with_name(f'.{out.name}.{os.getpid()}') if out.exists() else out
-    try:
-        with progress('recovering') as report:
-            saved = save(arguments.broken, aside, progress=report)
-        aside.replace(out)
-    finally:
-        if aside != out:
-            aside.unlink(missing_ok=True)
+    with replacing(arguments.output) as aside, progress('recovering') as report:
+        saved = save(arguments.broken, aside, progress=report)
     print(f'{arguments.output}: {saved}')
     return 0
 

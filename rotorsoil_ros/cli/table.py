@@ -4,6 +4,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 import csv
+from pathlib import Path
 import sys
 from typing import TextIO
 
@@ -12,6 +13,7 @@ import numpy as np
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.cli.arguments.options import PLANT, SI
+from rotorsoil_ros.cli.outputs import replacing
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.prediction import Response
 
@@ -117,7 +119,7 @@ def opened(target: str) -> Iterator[TextIO]:
         yield sys.stdout
         return
     try:
-        with open(target, 'w', encoding='utf-8') as stream:
+        with replacing(Path(target)) as aside, open(aside, 'w', encoding='utf-8') as stream:
             yield stream
     except OSError as error:
         error.filename = target  # a full disk does not say which file
