@@ -124,6 +124,23 @@ def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, c
     node.release()
 
 
+def test_a_reload_at_the_limit_of_threads_is_refused_and_the_node_lives(bench, monkeypatch):
+    def refuse(thread):
+        raise RuntimeError("can't start new thread")
+
+    bench.active('fan')
+    amplitude, _ = bench.answers()
+    publish = bench.speaker()
+    with monkeypatch.context() as limit:
+        limit.setattr(threading.Thread, 'start', refuse)
+        said = reload(bench)
+    assert not said.success
+    assert said.message == "can't start new thread; the old case stays"
+    publish(joint_state([300.0]))
+    bench.graph.until(lambda: amplitude, 'the answer')
+    assert reload(bench).success
+
+
 def test_two_publishers_of_one_speed_are_warned_of_by_name(bench, capfd):
     node = bench.active('fan')
     rival = bench.graph.add(Node('rival', context=bench.graph.context))

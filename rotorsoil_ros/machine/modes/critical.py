@@ -21,6 +21,9 @@ _MOST_SPEEDS = 400
 _ABOVE = 1.1
 _ALL = 10**6
 
+# Modes of a rotor at rest in one plane; a train of five machines has fifteen.
+_MOST_SLOW = 24
+
 # A rotor that moves so much less than its blocks stays still.
 _STILL = 1e-9
 
@@ -141,6 +144,11 @@ def critical_speeds(
         raise RotorSoilError(f'speed range must be 0 <= low < high in rad/s, got {low:g} to '
                              f'{high:g}')
     solver = SpectrumSolver.up_to(model, _ABOVE * high)
+    # What there is to be solved for grows with the cube of them.
+    if int((solver.basis.mass * high**2 > 1.0).sum()) > _MOST_SLOW:
+        raise NotSolvedError(
+            f'the rotor bends in more than {_MOST_SLOW} ways below {rad_s_to_rpm(high):g} rpm, '
+            'more than can be told apart: is it so soft?')
     speed = np.linspace(low, high, _FIRST_SPEEDS)
     while True:
         solver, found = solver.refined(speed, _ALL)

@@ -1,5 +1,6 @@
 """Modes and critical speeds against closed forms, full eigenproblems and published rotors."""
 
+from dataclasses import replace
 import itertools
 import math
 
@@ -134,6 +135,17 @@ def test_modes_that_cannot_be_told_apart_are_an_error(monkeypatch):
     monkeypatch.setattr(spectrum, '_REACHES', (0.1,))
     with pytest.raises(NotSolvedError, match='modes could not be told apart at 0 rpm'):
         campbell(elastic_machine(springy_soils()), SPEEDS, 20)
+
+
+@pytest.mark.parametrize('softer', [1e-9, 1e-40])
+def test_a_rotor_softer_than_any_is_refused_before_anything_is_solved(monkeypatch, softer):
+    machine = elastic_machine()
+    steel = replace(STEEL, young_modulus=STEEL.young_modulus * softer)
+    rotor = replace(machine.rotor, shaft=tuple(
+        replace(section, material=steel) for section in machine.rotor.shaft))
+    monkeypatch.setattr(SpectrumSolver, 'refined', pytest.fail)
+    with pytest.raises(NotSolvedError, match='bends in more than 24 ways below 9549'):
+        critical_speeds(replace(machine, rotor=rotor), (10.0, 1000.0))
 
 
 def test_one_mode_twice_is_a_repetition_but_two_of_one_frequency_are_not():
