@@ -161,6 +161,11 @@ class Teller:
             if level is not LEVELS[found[1].zone or 'A']:
                 said.append('speed changes')
         faults = list(self._account.sweeps.faults)
+        for channel, state in zones.measured.items():
+            # An alarm without a baseline is where zone C begins, which is told already.
+            if (limit := state.exceeds) and (limit == 'trip' or state.zone in ('A', 'B')):
+                faults.insert(0, f'{channel} is above its {limit} limit of '
+                                 f'{MM * getattr(state, limit):.2f} mm/s rms')
         if outside := self._account.band.outside:
             faults.insert(0, f'outside the band: {", ".join(sorted(outside))}')
         if faults:
@@ -182,6 +187,9 @@ class Teller:
                 found[f'{channel}_{source}_mm_s_rms'] = MM * state.velocity
                 found[f'{channel}_{source}_zone'] = state.zone or ''
                 found[f'{channel}_{source}_support'] = state.support or ''
+                if source == 'measured':
+                    found[f'{channel}_alarm_mm_s_rms'] = MM * state.alarm
+                    found[f'{channel}_trip_mm_s_rms'] = MM * state.trip
         for channel in band.channels:
             found[f'{channel}_inside_band'] = band.recent(channel)
         for channel, share in band.of_run().items():

@@ -50,11 +50,30 @@ class HousingZone:
 
 @dataclass(slots=True)
 class HousingState:
-    """One housing channel: velocity [m/s rms], zone and class of its support as last held."""
+    """
+    One housing channel as last held.
+
+    Attributes
+    ----------
+    velocity, alarm, trip : float
+        How fast it moves, and from which velocity on that is an alarm and a reason to stop
+        [m/s rms].
+    zone, support : str or None
+        Its zone, and the class of its support.
+
+    """
 
     velocity: float = math.nan
+    alarm: float = math.nan
+    trip: float = math.nan
     zone: Zone | None = None
     support: SupportClass | None = None
+
+    @property
+    def exceeds(self) -> str:
+        """Which of both limits is exceeded; nothing where none is."""
+        return 'trip' if self.velocity > self.trip else (
+            'alarm' if self.velocity > self.alarm else '')
 
 
 @dataclass(slots=True, eq=False)
@@ -161,6 +180,8 @@ class Zones:
         # Other limits make another question: nothing is held over from the last one.
         before = state.zone if support == state.support else None
         state.support = support
+        state.alarm = self._limits.alarm(support, abs(speed))
+        state.trip = self._limits.trip(support, abs(speed))
         state.zone = held_zone(before, velocity, self._limits.of(support, abs(speed)),
                                hysteresis=HYSTERESIS)
 

@@ -397,6 +397,23 @@ def test_level_is_that_of_the_zone(zoned, velocity, level):
     assert zoned.of(Zoned)[-1].predicted[Z] in 'ABCD'
 
 
+@pytest.mark.parametrize('velocity, level, said', [
+    (0.95, Level.OK, ''), (1.05, Level.WARN, 'is above its alarm limit of 1.00 mm/s rms'),
+    (2.5, Level.WARN, ''), (1.3 * 4.0, Level.ERROR, 'is above its trip limit of 5.00 mm/s rms')])
+def test_an_alarm_is_a_quarter_of_the_boundary_above_the_baseline(
+        fan, basis, velocity, level, said):
+    """ISO 20816-1: 0.5 + 2 / 4 mm/s; and to be stopped from 1.25 times 4 mm/s on."""
+    limits = replace(LIMITS, rigid=(0.9e-3, 2e-3, 4e-3), baseline=0.5e-3)
+    run = Run(replace(fan, case=replace(fan.case, zones=limits)), replace(basis, envelope=None))
+    dwell(run, [1e-3 * velocity] * 3)
+    told = run.vibration()[-1]
+    assert told.level is level
+    assert said in told.summary
+    assert bool(said) == ('limit' in told.summary)
+    assert told.values[f'{X}_alarm_mm_s_rms'] == pytest.approx(1.0)
+    assert told.values[f'{X}_trip_mm_s_rms'] == pytest.approx(5.0)
+
+
 def test_value_on_a_boundary_does_not_chatter(zoned):
     # A second is judged when the next one has begun.
     dwell(zoned, [1.9e-3, 2.01e-3, 1.99e-3, 2.01e-3, 1.95e-3, 2.02e-3, 2.02e-3, 2.02e-3])
