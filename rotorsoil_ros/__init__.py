@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.bags.tables.exported import export_log
     from rotorsoil_ros.bags.tables.imported import import_table, ImportedTable
     from rotorsoil_ros.case.design.report import DesignReport
+    from rotorsoil_ros.case.design.variants import Study, study
     from rotorsoil_ros.case.machine import load, Machine
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
@@ -70,8 +71,8 @@ __all__ = [
     'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction',
     'Predictor', 'Probe', 'Profile', 'Record', 'Rectangle', 'Response', 'ResponseTable',
     'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel',
-    'SoilSpread', 'SpeedSource', 'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish', 'compare',
-    'export_log', 'import_table', 'load', 'predict_many', 'read_profile',
+    'SoilSpread', 'SpeedSource', 'Study', 'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish',
+    'compare', 'export_log', 'import_table', 'load', 'predict_many', 'read_profile', 'study',
 ]
 
 # Which room a public name lives in.
@@ -82,6 +83,7 @@ _ROOMS = {
     'bags.tables.exported': ('export_log',),
     'bags.tables.imported': ('ImportedTable', 'import_table'),
     'case.design.report': ('DesignReport',),
+    'case.design.variants': ('Study', 'study'),
     'case.machine': ('Machine', 'load'),
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),

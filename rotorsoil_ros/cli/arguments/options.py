@@ -81,6 +81,29 @@ def number(what: str, *, above_zero: bool = False) -> Callable[[str], float]:
     return read
 
 
+def sweep_or_one(text: str) -> Sweep:
+    """Return a sweep, of one value where only one is given."""
+    return Sweep.parse(text if ':' in text else f'{text}:{text}:1')
+
+
+def choices(text: str) -> tuple[str, list[float]]:
+    """Return a key path and what is tried there, from `KEY=A:B:N` or `KEY=V,V,V`."""
+    key, _, told = text.partition('=')
+    try:
+        if told.count(':') == 2:
+            sweep = Sweep.parse(told)
+            step = (sweep.stop - sweep.start) / max(sweep.count - 1, 1)
+            values = [sweep.start + step * index for index in range(sweep.count)]
+        else:
+            values = [float(value) for value in told.split(',')]
+    except ValueError:
+        values = []
+    if not key or not values:
+        raise argparse.ArgumentTypeError(
+            f'must be KEY.PATH=start:stop:count or KEY.PATH=value,value, got {text!r}')
+    return key, values
+
+
 RPM = number('a speed >= 0 rpm')
 MULTIPLE = number('a multiple > 0 of the speed', above_zero=True)
 RATE = number('a factor > 0', above_zero=True)

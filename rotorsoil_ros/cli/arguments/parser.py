@@ -12,6 +12,7 @@ from rotorsoil_ros.cli.arguments.options import (
     add_table_output,
     add_units,
     add_verb,
+    choices,
     MULTIPLE,
     number_of,
     OneLineParser,
@@ -19,6 +20,7 @@ from rotorsoil_ros.cli.arguments.options import (
     RPM,
     SIZE,
     Sweep,
+    sweep_or_one,
     Verbs,
 )
 
@@ -96,6 +98,7 @@ def _add_case_verbs(verbs: Verbs) -> None:
     bearings.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse, required=True,
                           help='rotor speed [rpm]')
     add_table_output(bearings)
+    _add_study(verbs)
     _add_modal_verbs(verbs)
     plot = add_verb(verbs, 'plot', 'pictures:plot', 'draw every picture of a case')
     add_output(plot, 'DIR', 'directory for the PNG files')
@@ -103,6 +106,22 @@ def _add_case_verbs(verbs: Verbs) -> None:
                     "compute the seed paper's figures 6, 8 and 9", case=False)
     add_output(figures, 'DIR', 'directory for PNG and CSV files')
     figures.add_argument('--cache', metavar='DIR', type=Path, help='directory of computed tables')
+
+
+def _add_study(verbs: Verbs) -> None:
+    study = add_verb(verbs, 'study', 'study:study',
+                     'write the response with all values of some keys of a case as CSV')
+    add = study.add_argument
+    add('--vary', metavar='KEY.PATH=A:B:N', type=choices, action='append', required=True,
+        help='key of the case, as in soil.shear_modulus, and what is tried: A to B in N steps, '
+             'or V,V,V; may be repeated')
+    add('--rpm', metavar='A:B:N', type=sweep_or_one, required=True, help='rotor speed [rpm]')
+    add_output(study, 'FILE', 'CSV file to write', default='-')
+    add('--picture', metavar='X.png', type=Path,
+        help='highest velocity of a housing over the one or two keys')
+    add('--jobs', metavar='N', type=number_of('processes'), default=1,
+        help='processes (default: 1)')
+    study.set_defaults(outputs=('output', 'picture'))
 
 
 def _add_modal_verbs(verbs: Verbs) -> None:

@@ -1,0 +1,68 @@
+"""What if? The response of a machine with all values of some keys of its case."""
+
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+import csv
+import sys
+from typing import TYPE_CHECKING
+
+from rotorsoil_ros.case.design.variants import Study, study as solve
+from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.cli.sweeps import machine_of, values
+from rotorsoil_ros.cli.table import opened
+from rotorsoil_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.case.design.variants import TriesAll
+
+
+def study(arguments: Namespace) -> int:
+    """Solve every variant, write a row for each, its speeds and channels, and draw it."""
+    varied = dict(arguments.vary)
+    if len(varied) < len(arguments.vary):
+        raise InputError('--vary: a key is given twice')
+    if arguments.picture is not None and len(varied) > 2:
+        raise InputError('--picture shows one or two keys')
+    with progress('solving') as report, _mapped(arguments.jobs) as tries_all:
+        number, total = 0, 1
+        for each in varied.values():
+            total *= len(each)
+
+        def counted(function, variants, /):  # type: ignore[no-untyped-def]
+            nonlocal number
+            for tried in tries_all(function, variants):
+                number += 1
+                report(number, total)
+                yield tried
+
+        found = solve(machine_of(arguments), varied, rpm=values(arguments.rpm), map=counted)
+    with opened(arguments.output) as stream:
+        _write(found, stream)
+    if arguments.picture is not None:
+        from rotorsoil_ros.figures.variants import study_figure
+
+        study_figure(found).savefig(arguments.picture)
+    for line in dict.fromkeys(found.failures.values()):
+        print(line, file=sys.stderr)
+    return 0
+
+
+@contextmanager
+def _mapped(jobs: int) -> 'Iterator[TriesAll]':
+    if jobs == 1:
+        yield map
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from functools import partial
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(jobs, mp_context=get_context('spawn')) as pool:
+        yield partial(pool.map, chunksize=8)
+
+
+def _write(found: Study, stream: object) -> None:
+    names = dict.fromkeys(name for row in found.rows() for name in row)
+    writer = csv.DictWriter(stream, names, restval='', lineterminator='\n')  # type: ignore
+    writer.writeheader()
+    writer.writerows(found.rows())
