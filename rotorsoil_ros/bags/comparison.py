@@ -18,6 +18,7 @@ from rotorsoil_ros.monitor.comparison import Comparison, Run
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.health import REDATED
 from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.monitor.oil import Oils
 from rotorsoil_ros.monitor.points import Collector
 from rotorsoil_ros.monitor.rules import Judging, Matching, Rules
 from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
@@ -101,7 +102,8 @@ def compare(
         case = replace(case, uncertainty=replace(
             case.uncertainty, shear_modulus_factor=wish.soil_factor))
     expectation = Expectation.of(case, cache.directory(cache_directory))
-    reading = _Reading(inputs, expectation, wish, descriptions, progress)
+    oils = Machine(case, cache.directory(cache_directory)).oils
+    reading = _Reading(inputs, expectation, oils, wish, descriptions, progress)
     found, hindsight = reading.read({})
     if hindsight:  # a slow roll that comes late is the runout of what was before it, too
         found, _ = reading.read(hindsight)
@@ -114,6 +116,7 @@ class _Reading:
 
     inputs: Inputs
     expectation: Expectation
+    oils: Oils
     wish: Wish
     descriptions: Descriptions
     progress: Progress | None
@@ -127,7 +130,7 @@ class _Reading:
         monitor = Monitor(
             machine, expectation.table, expectation.case.unbalance, sinks=[collector],
             judging=Judging(rules, self.wish.turns, has_filter=expectation.case.anti_alias),
-            hindsight=hindsight)
+            hindsight=hindsight, oils=self.oils)
         monitor.judge.take_criteria(expectation.criteria(expectation.case.unbalance))
 
         def take(stamp_ns: int, description: Mapping[str, Any]) -> None:

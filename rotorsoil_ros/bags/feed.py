@@ -107,6 +107,11 @@ class Inputs:
 
     @property
     def is_measured(self) -> bool:
+        """Whether vibration is told."""
+        return any(each.number and each.tells_vibration for each in self.topics.values())
+
+    @property
+    def tells_more(self) -> bool:
         """Whether anything but speeds is told."""
         return any(each.number and not each.tells_speed for each in self.topics.values())
 
@@ -190,7 +195,7 @@ def feed(
     models = inputs.models if on_description is not None else ()
     # Where more is told than speeds, what belongs together has to come together.
     at_most, span_ns = (
-        (AT_ONCE, NANOSECONDS) if inputs.is_measured else (SPEEDS_AT_ONCE, LAST_STAMP))
+        (AT_ONCE, NANOSECONDS) if inputs.tells_more else (SPEEDS_AT_ONCE, LAST_STAMP))
     second = now_ns = None
     for batch in bag_reader.batches(
             inputs.bag, lambda topic, kind: (

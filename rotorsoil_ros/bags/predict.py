@@ -189,7 +189,7 @@ def predict(
         heard = [listener] if listener is not None else []
         monitor = Monitor(name, machine.table, unbalance,
                           sinks=[*told, largest, *viewer, *heard],
-                          judging=Judging.of(machine.case))
+                          judging=Judging.of(machine.case), oils=machine.oils)
         expected = criteria(machine.case, machine.model, unbalance, machine.directory)
         monitor.judge.take_criteria(expected)
         for each in heard:

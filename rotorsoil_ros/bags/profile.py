@@ -15,7 +15,7 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.wire.cdr import ARRAYS
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
-from rotorsoil_ros.wire.handlers import raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.handlers import OIL_TOPIC, raw_channel, SPEED_TOPICS, TOPICS
 from rotorsoil_ros.wire.messages import JointStateWriter, OWN_TOPICS, Records
 from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USUAL
 
@@ -45,6 +45,11 @@ class Input:
     def tells_speed(self) -> bool:
         """Whether it tells a speed, not a measurement."""
         return self.place.name in SPEED_TOPICS
+
+    @property
+    def tells_vibration(self) -> bool:
+        """Whether it tells how something vibrates."""
+        return not self.tells_speed and self.place.name != OIL_TOPIC
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,6 +74,8 @@ class Case:
         Whether a filter before each sensor's converter lets nothing above half its rate pass.
     journals : tuple of Journal
         Those of its bearings that are given by their geometry.
+    oil_temperatures : tuple of float
+        Mean temperatures of the films for which there are tables besides [deg C].
     cache_directory : Path or None
         Where the tables of their films lie; None is the usual one.
     content : mapping
@@ -99,9 +101,17 @@ class Case:
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
     anti_alias: bool = False
     journals: tuple[Journal, ...] = field(default=(), compare=False)
+    oil_temperatures: tuple[float, ...] = ()
     cache_directory: Path | None = field(default=None, compare=False, repr=False)
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+    def with_oil_of(self, celsius: float) -> 'Case':
+        """Return this case with films of another mean temperature [deg C], and no other."""
+        entries = [entry.get('journal') or {} for entry in self.content['rotor']['bearings']]
+        return self.changed(['rotor.oil_temperatures=[]', *(
+            f'rotor.bearings.{index}.journal.oil.temperature={celsius!r}'
+            for index, entry in enumerate(entries) if entry.get('oil'))])
 
     def changed(self, overrides: Sequence[str]) -> 'Case':
         """Return this case with settings on top, as `load` takes them."""
@@ -240,6 +250,7 @@ class _Builder:
         journals = None
         if rotor is not None and speed_range is not None:
             journals = self._journals().journals(rotor, speed_range)
+        oils = faults.attempt(self._journals().oil_temperatures)
         uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
         faults.tell()
         assert rotor is not None
@@ -249,6 +260,7 @@ class _Builder:
         assert speed_range is not None
         assert tables is not None
         assert journals is not None
+        assert oils is not None
         assert uncertainty is not None
         assert zones is not None
         layered = ground if isinstance(ground, LayeredSoil) else None
@@ -260,7 +272,7 @@ class _Builder:
             rotor=floated(rotor, journals), unbalance=unbalance, couples=unbalances.couples(),
             speed_range=speed_range, tables=tables,
             uncertainty=uncertainty, zones=zones, anti_alias=self.faults.entries.anti_alias,
-            journals=journals, cache_directory=self.cache_directory,
+            journals=journals, oil_temperatures=oils, cache_directory=self.cache_directory,
             content=self.content, files=self.files)
         with faults.at('rotor', entry=entries.rotor):
             self._refuse_size(CoupledModel(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.entries.bearing import JournalEntry, ViscosityTable
 from rotorsoil_ros.case.entries.entry import Place
 from rotorsoil_ros.case.rotor_entries import require_speeds
@@ -36,6 +38,9 @@ THINNEST = 10e-6
 
 # Share of the mean weight on a bearing below which it carries none.
 _UNLOADED = 1e-3
+
+# Each is a table of its own: this many are a minute of computing.
+_MOST_OILS = 16
 
 # Which keys belong to which types only, and which of them have no default.
 _OWN = {
@@ -160,6 +165,22 @@ class JournalEntries:
             return None
         return self.faults.attempt_each(
             lambda _, index: self._journal(index, loads[index], speed_range), places)
+
+    def oil_temperatures(self) -> tuple[float, ...]:
+        """Return for which temperatures of the oil tables are wanted besides, rising."""
+        rotor, place = self.faults.entries.rotor, ('rotor', 'oil_temperatures')
+        wanted = rotor.oil_temperatures
+        if wanted and not any(entry.journal is not None and entry.journal.oil is not None
+                              for entry in rotor.bearings):
+            raise self.faults.error(*place, problem='belongs to a rotor with a journal whose oil '
+                                                    'is given by grade and temperature')
+        if len(wanted) > _MOST_OILS:
+            raise self.faults.error(*place, problem=f'must be at most {_MOST_OILS} temperatures '
+                                                    f'in deg C, got {len(wanted)}')
+        if any(not left < right for left, right in pairwise(wanted)):
+            raise self.faults.error(*place, problem='must be rising temperatures in deg C, got '
+                                                    f'{shown(wanted)}')
+        return tuple(wanted)
 
     def _refuse_alignment(self, index: int) -> None:
         raise self.faults.error('rotor', 'bearings', index, 'alignment', problem=(

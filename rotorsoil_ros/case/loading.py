@@ -78,7 +78,7 @@ def reload(file: Path, *, cache_directory: Path | None) -> Machine:
 def _complete(file: Path, cache_directory: Path | None) -> Machine:
     """Return a machine with its table: a callback must not have to wait for it."""
     machine = Machine.load(file, cache_directory=cache_directory)
-    _ = machine.table
+    _ = machine.table, machine.oils
     return machine
 
 

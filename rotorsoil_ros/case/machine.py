@@ -69,6 +69,12 @@ class Machine:
         """The response over the whole speed range, which a running machine is looked up in."""
         return models.response_table(self.case, self.model, self.directory)
 
+    @cached_property
+    def oils(self) -> dict[float, ResponseTable]:
+        """The same by mean temperature of the oil films [deg C], for those that the case names."""
+        return {celsius: Machine(self.case.with_oil_of(celsius), self.directory).table
+                for celsius in self.case.oil_temperatures}
+
     def response(self, *, rpm: Numbers) -> Response:
         """
         Solve for the response to the unbalance of the case, exactly at every speed.

@@ -8,6 +8,7 @@ from rotorsoil_ros.case.entries.bearing import BearingEntry
 from rotorsoil_ros.case.entries.entry import Entry, EVEN, KEYS, LAYERED, WORD
 from rotorsoil_ros.case.quantities import (
     BalanceGrade,
+    Celsius,
     Count,
     FileName,
     Kilogram,
@@ -147,6 +148,7 @@ class RotorEntry(Entry):
     shaft: list[Section]
     discs: list[DiscEntry] = Field(default_factory=list)
     bearings: list[BearingEntry]
+    oil_temperatures: list[Celsius] = Field(default_factory=list)
     probes: list[ProbeEntry] = Field(default_factory=list)
 
 

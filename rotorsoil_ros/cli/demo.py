@@ -28,7 +28,7 @@ from rotorsoil_ros.figures.response import all_figures, trend
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
-from rotorsoil_ros.wire.cdr import JointStateReader
+from rotorsoil_ros.wire.sensors import JointStateReader
 
 MACHINE = 'paper_rotor'
 

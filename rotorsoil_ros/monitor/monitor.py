@@ -22,6 +22,7 @@ from rotorsoil_ros.events import (
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.monitor.health import Health, STANDING, STANDSTILL
 from rotorsoil_ros.monitor.judge import Judge
+from rotorsoil_ros.monitor.oil import Oils, OilTables
 from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.units import rad_s_to_rpm, SPEED_UNITS
@@ -43,18 +44,20 @@ class Monitor:
     def __init__(
         self, machine: str, table: ResponseTable, unbalance: ComplexArray, *,
         sinks: Sequence[Sink], judging: Judging | None = None,
-        hindsight: Mapping[str, complex] | None = None,
+        hindsight: Mapping[str, complex] | None = None, oils: Oils | None = None,
     ) -> None:
         self.machine = machine
         self.table = table
         self.health = Health(machine, table.speed_range)
         self.health.standing = '; '.join(unstable(table.stability))
         self._sinks = tuple(sinks)
+        self._unbalance, self._oils = unbalance, OilTables(oils or {})
         self._predictor = table.predictor(unbalance)
         self.judge = Judge(machine, self._predictor, judging or Judging(), hindsight=hindsight)
 
     def set_unbalance(self, unbalance: ComplexArray) -> None:
         """Use another unbalance, (planes,) [kg m], from the next speed on."""
+        self._unbalance = unbalance
         self._predictor = self.table.predictor(unbalance)
         self.judge.take_predictor(self._predictor)
 
@@ -79,14 +82,30 @@ class Monitor:
 
     def take_table(
         self, table: ResponseTable, unbalance: ComplexArray, *, sinks: Sequence[Sink],
-        judging: Judging | None = None,
+        judging: Judging | None = None, oils: Oils | None = None,
     ) -> None:
         """Answer from another table and judge by other rules, from the next speed on."""
+        self._unbalance, self._oils = unbalance, OilTables(oils or {})
         self._predictor = table.predictor(unbalance)
         self.judge = Judge(self.machine, self._predictor, judging or Judging())
-        self.table, self._sinks = table, tuple(sinks)
+        self._sinks = tuple(sinks)
+        self._stand_on(table)
+
+    def _stand_on(self, table: ResponseTable) -> None:
+        self.table = table
         self.health.speed_range = table.speed_range
         self.health.standing = '; '.join(unstable(table.stability))
+
+    def on_oil_temperature(self, stamp_ns: IntArray, celsius: FloatArray) -> None:
+        """Answer from the tables of the oil's temperatures (n,) [deg C], from now on."""
+        for stamp, degrees in zip(stamp_ns.tolist(), celsius.tolist(), strict=True):
+            if (table := self._oils.chosen(degrees)) is None:
+                continue
+            self._stand_on(table)
+            self.set_unbalance(self._unbalance)
+            self._emit(Remark(self.machine, stamp, Level.OK, self._oils.words(degrees)))
+            for text in unstable(table.stability):
+                self._emit(Remark(self.machine, stamp, Level.ERROR, text))
 
     def on_measured(self, measured: Measured) -> None:
         """Hand on what a measuring system says about this machine."""

@@ -23,8 +23,8 @@ from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
 from rotorsoil_ros.units import rad_s_to_rpm
 from rotorsoil_ros.wire.dating import Arrival
-from rotorsoil_ros.wire.definitions import IMU, STRING
-from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, raw_channel
+from rotorsoil_ros.wire.definitions import IMU, STRING, TEMPERATURE
+from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, OIL_TOPIC, raw_channel
 from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
 
 RAW_DEPTH = 1000  # samples kept while the node is busy
@@ -57,7 +57,8 @@ class Watch:
         self._shown_channels = machine.table.channels
         self._told: set[str] = set()
         self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks(),
-                               judging=settings.judging(name, machine.case))
+                               judging=settings.judging(name, machine.case),
+                               oils=machine.oils)
         self._raw_topics: dict[str, str] = {}
         self._speed = settings.speed(name)
         try:
@@ -100,7 +101,7 @@ class Watch:
         self._settings.renew_unbalance(self.name, machine.table.planes, machine.case.unbalance)
         self.monitor.take_table(
             machine.table, self._unbalance(), sinks=self._sinks(),
-            judging=self._settings.judging(self.name, machine.case))
+            judging=self._settings.judging(self.name, machine.case), oils=machine.oils)
         if self.is_active:
             self.monitor.describe(
                 self._node.get_clock().now().nanoseconds, self._description())
@@ -175,6 +176,8 @@ class Watch:
     def _subscribe(self) -> None:
         for name, kind in MEASURED_TOPICS.items():
             self._hear(name, kind, depth=self._settings.value('speed_depth'))
+        if self._machine.oils:
+            self._hear(OIL_TOPIC, TEMPERATURE, depth=self._settings.value('speed_depth'))
         for channel in self._machine.table.channels:
             name = f'measured/{channel}/imu'
             if raw_channel(name):

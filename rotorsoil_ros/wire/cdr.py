@@ -1,25 +1,19 @@
 """Where do the fields of a message lie in its CDR bytes? One walk, to read and to write them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import groupby
 import struct
 import sys
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.monitor.vectors.orders import LARGEST_ACCELERATION
 from rotorsoil_ros.wire.definitions import (
     Compound,
     compound,
-    IMU,
-    JOINT_STATE,
     Kind,
     Number,
     NUMBERS,
@@ -276,34 +270,6 @@ def _new(kind: Kind) -> Any:
             return {}
 
 
-@dataclass(frozen=True, slots=True)
-class JointStates:
-    """Decoded JointStates of one layout; an array that the message left empty is NaN."""
-
-    names: tuple[str, ...]
-    stamp_ns: IntArray
-    position: FloatArray
-    velocity: FloatArray
-    effort: FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class Accelerations:
-    """
-    Stamps (n,) [ns] and accelerations (n, 3) [m/s^2], NaN where the sensor has none.
-
-    `turned` is the angle (n,) by which its orientation turns the axes [rad], 0 if it has none.
-    """
-
-    stamp_ns: IntArray
-    acceleration: FloatArray
-    is_synthetic: bool
-    turned: FloatArray
-
-
-Decoded = TypeVar('Decoded', bound=JointStates | Accelerations)
-
-
 class Layouts:
     """Finds the layouts of messages of one type: one publisher keeps its own, read once."""
 
@@ -319,82 +285,3 @@ class Layouts:
             except InputError:
                 self._layout = None
         return self._layout
-
-
-class Reader(Layouts, Generic[Decoded]):
-    """Decodes messages as they come."""
-
-    def __init__(
-        self, message_type: str, decode: Callable[[Layout, Sequence[bytes]], Decoded],
-    ) -> None:
-        super().__init__(message_type)
-        self._decode = decode
-
-    def runs(self, cdrs: Sequence[bytes]) -> Iterator[tuple[list[bytes], Decoded | None]]:
-        """Split messages into runs of one layout, decoded; None where they are malformed."""
-        for layout, run in groupby(cdrs, key=self.layout):
-            messages = list(run)
-            yield messages, self._decode(layout, messages) if layout else None
-
-
-class JointStateReader(Reader[JointStates]):
-    """Decodes JointStates."""
-
-    def __init__(self) -> None:
-        super().__init__(JOINT_STATE, joint_states)
-
-
-class ImuReader(Reader[Accelerations]):
-    """Decodes samples of accelerometers."""
-
-    def __init__(self) -> None:
-        super().__init__(IMU, accelerations)
-
-
-def joint_states(layout: Layout, cdrs: Sequence[bytes]) -> JointStates:
-    """Decode n messages that all fit one layout; arrays are (n, names)."""
-    rows, names = layout.rows(cdrs), layout.texts['name']
-    return JointStates(names, _stamps(rows), *(
-        _full(rows[array], len(names)) for array in ARRAYS))
-
-
-def accelerations(layout: Layout, cdrs: Sequence[bytes]) -> Accelerations:
-    """Decode n samples that all fit one layout."""
-    rows = layout.rows(cdrs)
-    acceleration = rows['linear_acceleration'].astype(float)
-    acceleration[rows['linear_acceleration_covariance'][:, 0] == NOT_MEASURED] = np.nan
-    acceleration[np.abs(acceleration) > LARGEST_ACCELERATION] = np.nan
-    return Accelerations(_stamps(rows), acceleration,
-                         layout.texts['header.frame_id'][0].startswith(SYNTHETIC),
-                         _turned(rows))
-
-
-def _turned(rows: np.ndarray) -> FloatArray:
-    """Return the angles (n,) by which orientations turn [rad], 0 where none is told."""
-    quaternion = rows['orientation'].astype(float)
-    largest = np.max(np.abs(quaternion), axis=1)
-    is_told = (np.isfinite(largest) & (largest > 0.0)
-               & (rows['orientation_covariance'][:, 0] != NOT_MEASURED))
-    # Only its direction counts; whoever sends 1e300 must not make squares overflow.
-    quaternion = np.where(is_told[:, None], quaternion, 0.0) / np.where(
-        is_told, largest, 1.0)[:, None]
-    # The whole angle from both parts: of a small one the cosine alone has no digits.
-    angle = 2.0 * np.arctan2(np.linalg.norm(quaternion[:, :3], axis=1),
-                             np.abs(quaternion[:, 3]))
-    return np.where(is_told, angle, 0.0)
-
-
-def _stamps(rows: np.ndarray) -> IntArray:
-    """Return the stamps (n,) of stamped messages [ns]."""
-    seconds = rows['header.stamp.sec'].astype(np.int64)
-    return np.asarray(seconds * NANOSECONDS + rows['header.stamp.nanosec'])
-
-
-def _full(values: npt.NDArray[Any], width: int) -> FloatArray:
-    """Return one value per joint: NaN where the message has none."""
-    if values.shape[1] == width:
-        return values.astype(float)
-    full = np.full((len(values), width), np.nan)
-    given = min(width, values.shape[1])
-    full[:, :given] = values[:, :given]
-    return full

@@ -12,6 +12,7 @@ from rotorsoil_ros.errors import InputError
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 IMU = 'sensor_msgs/msg/Imu'
+TEMPERATURE = 'sensor_msgs/msg/Temperature'
 FLOAT64 = 'std_msgs/msg/Float64'
 STRING = 'std_msgs/msg/String'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
@@ -21,6 +22,7 @@ LOG = 'rcl_interfaces/msg/Log'
 TYPE_HASHES = {
     JOINT_STATE: 'a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e',
     IMU: '7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b',
+    TEMPERATURE: '72514a14126ab9f8a9abec974c78e5610a367b59db5da355ff1fb982d5bad4b8',
     FLOAT64: '705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a',
     STRING: 'df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18',
     DIAGNOSTICS: '5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e',

@@ -11,23 +11,26 @@ from rotorsoil_ros.arrays import IntArray
 from rotorsoil_ros.channel import Channel, named
 from rotorsoil_ros.events import Measured, Samples
 from rotorsoil_ros.monitor.monitor import Monitor
-from rotorsoil_ros.wire.cdr import (
+from rotorsoil_ros.wire.cdr import AXES
+from rotorsoil_ros.wire.dating import are_stamps, Dating, Note
+from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE, TEMPERATURE
+from rotorsoil_ros.wire.messages import JointStateWriter, Records
+from rotorsoil_ros.wire.sensors import (
     Accelerations,
-    AXES,
     Decoded,
     ImuReader,
     JointStateReader,
     JointStates,
     Reader,
+    Temperatures,
+    temperatures,
 )
-from rotorsoil_ros.wire.dating import are_stamps, Dating, Note
-from rotorsoil_ros.wire.definitions import FLOAT64, IMU, JOINT_STATE
-from rotorsoil_ros.wire.messages import JointStateWriter, Records
 from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, Speeds, SpeedSource, USUAL
 
 SPEED_TOPICS = {'joint_states': JOINT_STATE, 'rotor/speed': FLOAT64}
+OIL_TOPIC = 'oil_temperature'
 MEASURED_TOPICS = {'measured/amplitude': JOINT_STATE, 'measured/phase': JOINT_STATE}
-TOPICS = SPEED_TOPICS | MEASURED_TOPICS
+TOPICS = SPEED_TOPICS | MEASURED_TOPICS | {OIL_TOPIC: TEMPERATURE}
 RAW_NAME = re.compile(r'measured/(\w+)/imu')
 
 Outlet: TypeAlias = Callable[[Records], None]
@@ -150,6 +153,13 @@ def _tell_samples(
         samples.turned[rows]))
 
 
+def _tell_oil(
+    monitor: Monitor, stamp_ns: IntArray, found: Temperatures, rows: Sequence[int],
+) -> None:
+    """Tell temperatures of the oil."""
+    monitor.on_oil_temperature(stamp_ns, found.celsius[rows])
+
+
 def raw_channel(name: str) -> Channel | None:
     """Return the channel of a name such as `measured/<channel>/imu`; None of other names."""
     found = RAW_NAME.fullmatch(name)
@@ -182,6 +192,9 @@ def inlet(
     if channel := raw_channel(name):
         return StampedInlet(topic, IMU, ImuReader(), partial(_tell_samples, monitor, channel),
                             note=monitor.health.note, log=log)
+    if name == OIL_TOPIC:
+        return StampedInlet(topic, TEMPERATURE, Reader(TEMPERATURE, temperatures),
+                            partial(_tell_oil, monitor), note=monitor.health.note, log=log)
     if name in SPEED_TOPICS:
         return SpeedInlet(topic, message_type or SPEED_TOPICS[name], monitor, source=speed,
                           log=log, told=told)

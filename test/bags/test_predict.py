@@ -17,9 +17,10 @@ from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.cdr import joint_states, Layout
+from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
+from rotorsoil_ros.wire.sensors import joint_states
 
 from records import topics_of
 

@@ -24,9 +24,9 @@ from rotorsoil_ros.events import LAST_STAMP, Measured, Predicted, Samples
 from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor
-from rotorsoil_ros.wire.cdr import JointStateReader
 from rotorsoil_ros.wire.handlers import inlet, TOPICS
 from rotorsoil_ros.wire.messages import Encoder, Topics
+from rotorsoil_ros.wire.sensors import JointStateReader
 
 from records import topics_of
 

@@ -8,13 +8,9 @@ from rosbags.typesys import get_typestore, Stores
 from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.wire.cdr import (
-    _turned,
-    joint_states as decode,
-    JointStateReader,
-    Layout,
-)
+from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.sensors import _turned, joint_states as decode, JointStateReader
 
 NUMBERS = some.floats(allow_nan=False)
 WORDS = some.text(some.characters(codec='ascii', exclude_characters='\0'), max_size=9)

@@ -15,10 +15,11 @@ from rotorsoil_ros.bags.tables.files import opened, require_suffix, Value
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.wire.cdr import JointStateReader, Layout
+from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE
 from rotorsoil_ros.wire.handlers import SPEED_TOPICS
 from rotorsoil_ros.wire.messages import NODE_NAME, OWN_TOPICS, Records
+from rotorsoil_ros.wire.sensors import JointStateReader
 from rotorsoil_ros.wire.speeds import SpeedReader, USUAL
 
 Progress = Callable[[int, int], None]

@@ -15,8 +15,9 @@ from rotorsoil_ros.bags.tables.imported import import_table
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.units import rpm_to_rad_s
-from rotorsoil_ros.wire.cdr import joint_states, Layout
+from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import JOINT_STATE
+from rotorsoil_ros.wire.sensors import joint_states
 
 from records import import_run_up
 
