@@ -13,8 +13,12 @@ from rotorsoil_ros.errors import NotSolvedError
 # Points of the film between the middle of the bearing and its end.
 AXIAL = 10
 
-# Exchanges of wet and dry points before the film is given up; it takes eight from nothing.
-_PASSES = 60
+# Exchanges of wet and dry points, for each point over the angle, before the film is given up:
+# eight are usual from nothing, but a film that has to grow does so by one point each time.
+_PASSES = 2
+
+# Of the largest pressure or source: less is neither a film nor none.
+_TIE = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,14 +214,15 @@ class Film:
         """Return pressure, wet points and the factor of the operator among them."""
         if wet is None:
             wet = np.ones(right.shape, dtype=bool)
-        for _ in range(_PASSES):
+        for _ in range(_PASSES * self.cells):
             factor, info = dpbtrf(self._band(around, along, wet), lower=1)
             if info:
                 break
             solved, _ = dpbtrs(factor, np.where(wet, right, 0.0).reshape(-1, 1), lower=1)
             pressure = solved.reshape(right.shape)
-            lifted = self._applied(pressure, around, along) < right
-            now = np.where(wet, pressure > 0.0, lifted)
+            # What is zero but for round-off would change sides with every pass.
+            lifted = self._applied(pressure, around, along) < right - _TIE * np.abs(right).max()
+            now = np.where(wet, pressure > -_TIE * pressure.max(), lifted)
             if np.array_equal(now, wet):
                 return pressure, wet, factor
             wet = now
