@@ -361,3 +361,11 @@ def test_quiet_leaves_out_warnings_only(capsys):
     quiet = capsys.readouterr().out
     assert main(['campbell', PAPER, '--rpm', '60:900:2', '-v']) == 0
     assert capsys.readouterr().out == quiet
+
+
+def test_range_may_be_one_number(capsys):
+    assert main(['response', PAPER, '--rpm', '2000']) == 0
+    one = capsys.readouterr().out
+    assert main(['response', PAPER, '--rpm', '2000:2000:1']) == 0
+    assert capsys.readouterr().out == one
+    assert len(one.splitlines()) == 2

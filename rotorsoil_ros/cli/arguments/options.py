@@ -43,7 +43,7 @@ class _Force(argparse.Action):
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """Evenly spaced values `start:stop:count`, ends included."""
+    """Evenly spaced values `start:stop:count`, ends included; or one number."""
 
     start: float
     stop: float
@@ -53,7 +53,8 @@ class Sweep:
     def parse(cls, text: str) -> 'Sweep':
         """Return the sweep that a command line asks for."""
         try:
-            start, stop, count = text.split(':')
+            # One number stands for itself.
+            start, stop, count = text.split(':') if ':' in text else (text, text, '1')
             sweep = cls(float(start), float(stop), int(count))
         except ValueError as error:
             raise argparse.ArgumentTypeError(
