@@ -119,6 +119,8 @@ class Comparison:
         return [*self.run.notes, *self._of_the_case(), *self._of_channels(), *self._of_peaks()]
 
     def _of_the_case(self) -> Iterator[str]:
+        if said := self.account.suspicion.said:
+            yield said
         if self.expectation.note:
             yield self.expectation.note
         if self.expectation.band is None:

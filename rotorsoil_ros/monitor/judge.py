@@ -31,6 +31,7 @@ from rotorsoil_ros.monitor.criteria import answer, Criteria
 from rotorsoil_ros.monitor.inside import BandShare
 from rotorsoil_ros.monitor.quasistatic import Pace
 from rotorsoil_ros.monitor.rules import Judging
+from rotorsoil_ros.monitor.suspicion import Suspicion
 from rotorsoil_ros.monitor.sweep import Sweeps
 from rotorsoil_ros.monitor.vectors.demodulation import Demodulator
 from rotorsoil_ros.monitor.vectors.history import History
@@ -76,8 +77,9 @@ class Judge:
         self._band = BandShare(judging.rules)
         self._zones = Zones(judging.rules.zones, predictor.channels)
         self._sweeps = Sweeps(machine, judging.rules)
+        self._suspicion = Suspicion()
         self.account = Account(judging.rules, self._band, self._zones, self._sweeps,
-                               of_case=list(unstable(predictor.table.stability)))
+                               self._suspicion, of_case=list(unstable(predictor.table.stability)))
         self._teller = Teller(machine, self.account)
         self._unknown: set[Channel] = set()
         self._told: set[Channel] = set()
@@ -175,6 +177,7 @@ class Judge:
         for weighed in self._dated(self._pace, settled_ns):
             self._zones.take(weighed)
             self._band.see(weighed)
+            self._suspicion.see(weighed)
             self._sweeps.take(weighed)
         yield from self._counted(self._sweeps.follow(
             stamps, speed, now_ns if settled_ns == math.inf else int(settled_ns)))

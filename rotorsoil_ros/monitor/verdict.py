@@ -8,6 +8,7 @@ from rotorsoil_ros.events import Diagnostics, Event, Level, NANOSECONDS, Remark,
 from rotorsoil_ros.monitor.inside import BandShare
 from rotorsoil_ros.monitor.passage import peak_fault, PeakPair
 from rotorsoil_ros.monitor.rules import Rules
+from rotorsoil_ros.monitor.suspicion import Suspicion
 from rotorsoil_ros.monitor.sweep import Sweeps
 from rotorsoil_ros.monitor.zones import HousingState, HousingZone, worst_state, Zones
 from rotorsoil_ros.units import rad_s_to_rpm
@@ -29,10 +30,11 @@ class Account:
     """What a judge has found out about a run so far: shares, peaks, zones, and what they say."""
 
     def __init__(
-        self, rules: Rules, band: BandShare, zones: Zones, sweeps: Sweeps, *,
-        of_case: Sequence[str] = (),
+        self, rules: Rules, band: BandShare, zones: Zones, sweeps: Sweeps,
+        suspicion: Suspicion, *, of_case: Sequence[str] = (),
     ) -> None:
         self.rules, self.band, self.zones, self.sweeps = rules, band, zones, sweeps
+        self.suspicion = suspicion
         self._of_case = of_case
 
     @property
@@ -54,6 +56,8 @@ class Account:
         """Return what speaks against the machine, each in one line; first what its case says."""
         rules = self.rules
         found = [*self._of_case]
+        if self.suspicion.is_of_unit:
+            return found  # amplitudes of another unit speak neither for the machine nor against
         found += [f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the band, '
                   f'{100 * rules.inside_share:.0f} % should'
                   for channel, share in self.inside.items() if share < rules.inside_share]
@@ -68,6 +72,8 @@ class Account:
         """Failing for any reason; undecided where nothing could be held against anything."""
         if self.failures():
             return Verdict.FAILS
+        if self.suspicion.said:
+            return Verdict.UNDECIDED
         is_judged = bool(self.inside) or any(
             peak.is_complete and peak.is_slow for peak in self.peaks)
         return Verdict.PASSES if is_judged else Verdict.UNDECIDED
@@ -82,6 +88,7 @@ class Teller:
         self._heard_ns: int | None = None
         self._zones: dict[Channel, str] = {}
         self._is_stale = False
+        self._suspected = ''
 
     def tell(
         self, now_ns: int, *, stale_after_s: float, has_data: bool, has_phase: bool,
@@ -135,6 +142,10 @@ class Teller:
             yield Remark(self._machine, now_ns, Level.STALE if is_stale else Level.OK,
                          'nothing is measured any more' if is_stale else
                          'measurements are back')
+        if (suspected := self._account.suspicion.said) != self._suspected:
+            self._suspected = suspected
+            yield Remark(self._machine, now_ns, Level.WARN if suspected else Level.OK,
+                         suspected or 'what is measured looks like what it is')
         for channel, state in self._account.zones.measured.items():
             before = self._zones.get(channel)
             if state.zone is not None and state.zone != before:
@@ -168,6 +179,10 @@ class Teller:
                                  f'{MM * getattr(state, limit):.2f} mm/s rms')
         if outside := self._account.band.outside:
             faults.insert(0, f'outside the band: {", ".join(sorted(outside))}')
+        if suspected := self._account.suspicion.said:
+            faults.insert(0, suspected)
+            if self._account.suspicion.is_of_unit:  # then its zone is no news of the machine
+                level = min(level, Level.WARN)
         if faults:
             level = max(level, Level.WARN)
         return level, '; '.join([*said, *faults]) or 'compared with the prediction'

@@ -8,9 +8,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.monitor.identification.fit import Problem
-
-# A run is suspected if as it is more than this share is left, and a slip leaves so much less.
-_LEFT_AS_IS, _LEFT_UNDONE = 0.02, 1.0 / 3.0
+from rotorsoil_ros.monitor.suspicion import LEFT_AS_IS, LEFT_SHARE, SAID, UNDO
 
 _LEFT_WITHOUT, _COHERENT = 0.05, 0.8
 _LEFT_MENDED = 0.25
@@ -44,23 +42,12 @@ def of_all_channels(problem: Problem, omega: FloatArray, left: Left) -> str:
 
     """
     as_is = left(problem)
-    if as_is <= _LEFT_AS_IS:
+    if as_is <= LEFT_AS_IS:
         return ''
-    factor = omega[:, None]
-    tried = {
-        'amplitudes look like velocities: they were taken for displacements':
-            problem.measured / factor,
-        'amplitudes look like accelerations: they were taken for displacements':
-            problem.measured / factor**2,
-        'amplitudes look like displacements: they were taken for velocities':
-            problem.measured * factor,
-        'amplitudes look like displacements: they were taken for accelerations':
-            problem.measured * factor**2,
-        'phase looks reversed: lag given as lead': problem.measured.conj()}
-    found = {name: left(replace(problem, measured=measured))
-             for name, measured in tried.items()}
+    found = {name: left(replace(problem, measured=undo(problem.measured, omega[:, None])))
+             for name, undo in UNDO.items()}
     best = min(found, key=lambda name: found[name])
-    return best if found[best] < _LEFT_UNDONE * as_is else ''
+    return SAID[best] if found[best] < LEFT_SHARE * as_is else ''
 
 
 def of_one_channel(
@@ -83,7 +70,7 @@ def of_one_channel(
     as_is = left(problem)
     without = [left(_without(problem, channel)) for channel in range(channels)]
     suspect = int(np.argmin(without))
-    if not (as_is > _LEFT_AS_IS and without[suspect] < _LEFT_WITHOUT):
+    if not (as_is > LEFT_AS_IS and without[suspect] < _LEFT_WITHOUT):
         return None
     implied, given = predicted(problem, suspect), problem.given[:, suspect]
     mine, theirs = problem.measured[given, suspect], implied[given]

@@ -90,10 +90,10 @@ def test_smooth_residual_and_a_case_that_is_not_the_machine_are_told(fan):
 
 
 @pytest.mark.parametrize('slip, said', [
-    (lambda values: values * SPEED[:, None], 'amplitudes look like velocities'),
-    (lambda values: values * SPEED[:, None]**2, 'amplitudes look like accelerations'),
-    (lambda values: values / SPEED[:, None], 'amplitudes look like displacements'),
-    (np.conj, 'phase looks reversed: lag given as lead')])
+    (lambda values: values * SPEED[:, None], 'amplitudes look like mm/s: velocities'),
+    (lambda values: values * SPEED[:, None]**2, 'amplitudes look like m/s^2: accelerations'),
+    (lambda values: values / SPEED[:, None], 'amplitudes look like um: displacements'),
+    (np.conj, 'phase looks reversed')])
 def test_slip_of_all_channels_is_named(fan, slip, said):
     assert said in slip_in(fan, slip(noisy(exact(), 0.01)))
 
