@@ -28,6 +28,7 @@ setup(
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', sorted(glob('config/*.yaml'))),
         (f'share/{NAME}/config/library', sorted(glob('config/library/*.yaml'))),
+        (f'share/{NAME}/layouts', sorted(glob('layouts/*'))),
         (f'share/{NAME}/launch', sorted(glob('launch/*.py') + glob('launch/*.yaml'))),
     ],
     zip_safe=False,
@@ -56,6 +57,7 @@ setup(
             'sphinx>=8.0',
             'ziamath>=0.12',
         ],
+        'bags': ['rosbags>=0.11.0'],
         'frames': ['pandas>=2.0', 'xarray>=2023.6'],
         'ros': [
             'ros-jazzy-common-interfaces>=5.3.6',

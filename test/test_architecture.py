@@ -30,7 +30,7 @@ OWNERS = {
     **{name: {'node', 'testing'} for name in ROS}, 'pytest': {'testing'},
     'rerun': {'screen'}, 'mcap': {'bags'},
     'matplotlib': {'figures'}, 'pandas': {BASE}, 'xarray': {BASE}, 'pydantic': {'case', 'bags'},
-    'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags'},
+    'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags'}, 'rosbags': {'bags'},
     'pyarrow': {'bags', 'screen'},  # rerun itself needs it
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},
 }

@@ -22,6 +22,8 @@ FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 FILE_NAME = 'metadata.yaml'
 INFORMATION = 'rosbag2_bagfile_information'
 RECOVERED = '_recovered'
+SQLITE, ROS1 = '.db3', '.bag'
+FOREIGN = (SQLITE, ROS1)  # storages that are read, and never written
 
 # The one in C takes a tenth of the time, which counts while machines are being answered.
 Dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
@@ -57,7 +59,7 @@ class BagContents:
 
 def files(path: Path) -> list[Path]:
     """
-    Return the MCAP files of a bag directory in their order, or the one file that it is.
+    Return the files of a bag directory in their order, or the one file that it is.
 
     Where a broken file was recovered beside itself, it is the recovered one.
     """
@@ -71,20 +73,21 @@ def files(path: Path) -> list[Path]:
     found = list(dict.fromkeys(
         beside(file) if beside(file).is_file() else file
         for file in listed or without_recovered(files_in(path))))
-    if strange := [file.name for file in found if file.suffix != '.mcap']:
-        raise InputError(f'{path}: {", ".join(strange)}: no MCAP file; other storages must be '
-                         'converted first')
+    if strange := [file.name for file in found if file.suffix not in ('.mcap', *FOREIGN)]:
+        raise InputError(f'{path}: {", ".join(strange)}: of a storage that is not read; `ros2 bag '
+                         'convert` it first')
     if not found:
         packed = ', '.join(sorted(file.name for file in path.glob('*.mcap.*')))
         raise InputError(f'{path}: holds no MCAP file' + (
             f', but {packed}: unpack them first' if packed else
-            '; other storages must be converted first'))
+            ', nor one of SQLite'))
     return found
 
 
 def files_in(bag: Path) -> list[Path]:
-    """Return the MCAP files that lie in a directory, in the order of their numbers."""
-    return sorted(bag.glob('*.mcap'), key=lambda file: (number_in(file.stem), file.name))
+    """Return the files that lie in a directory, MCAP if there are any, by their numbers."""
+    found = list(bag.glob('*.mcap')) or list(bag.glob(f'*{SQLITE}'))
+    return sorted(found, key=lambda file: (number_in(file.stem), file.name))
 
 
 def number_in(name: str) -> int:

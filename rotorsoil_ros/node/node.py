@@ -330,6 +330,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stop = Stop()
     with ExitStack() as stack:
         try:
+            if plain:
+                raise InputError('arguments must stand behind --ros-args, got '
+                                 f'{" ".join(plain)} (see --help)')
             with _refused_by_ros():
                 rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
                 stack.callback(rclpy.try_shutdown)

@@ -16,6 +16,9 @@ from rotorsoil_ros.wire.definitions import JOINT_STATE
 from graphs import speak
 from records import topics_of
 
+PARAMETER_FILES = {
+    'BROKEN': 'a: [\n', 'EMPTY': '', 'OTHER': '/**: {ros__parameters: {machines: [fan], fan: '
+                                              '{case: 7}}}\n'}
 AMPLITUDE = '/rotorsoil/fan/amplitude'
 
 
@@ -57,14 +60,31 @@ def test_bad_input_ends_the_process_with_2_and_one_line(start, parameter, compla
     (['-p', 'foo'], "Couldn't parse parameter override rule: '-p foo'"),
     (['-r', 'foo'], "Couldn't parse remap rule: '-r foo'"),
     (['--log-level', 'loud'], "Couldn't parse log level: '--log-level loud'"),
-    (['--foo'], "arguments after --ros-args must be known, got ['--foo']")])
-def test_arguments_that_ros_does_not_know_end_it_with_2_and_one_line(arguments, complaint):
+    (['--foo'], "arguments after --ros-args must be known, got ['--foo']"),
+    (['--params-file', 'BROKEN'], "Couldn't parse params file: '--params-file"),
+    (['--params-file', 'EMPTY'], 'parameter machines: must name at least one machine, got none'),
+    (['--params-file', 'OTHER'], 'parameter fan.case: Trying to set parameter'),
+    (['-p', 'machines:=[fan]', '-p', 'fan.case:=paper_rotor', '-p', 'fan.speed.ratio:=two'],
+     'parameter fan.speed.ratio: must be a number')])
+def test_arguments_that_ros_does_not_know_end_it_with_2_and_one_line(
+        arguments, complaint, tmp_path):
+    for name, text in PARAMETER_FILES.items():
+        (tmp_path / name).write_text(text)
+    arguments = [str(tmp_path / each) if each in PARAMETER_FILES else each for each in arguments]
     done = subprocess.run(
         [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args', *arguments],
         capture_output=True, text=True, timeout=DEADLINE_S)
     assert done.returncode == 2
     (line,) = (done.stdout + done.stderr).splitlines()
     assert complaint in line
+
+
+def test_arguments_before_those_of_ros_are_refused_with_a_hint():
+    done = subprocess.run(
+        [sys.executable, '-m', 'rotorsoil_ros.node.node', '-p', 'machines:=[fan]'],
+        capture_output=True, text=True, timeout=DEADLINE_S)
+    assert done.returncode == 2
+    assert 'arguments must stand behind --ros-args, got -p machines:=[fan]' in done.stderr
 
 
 def test_a_kill_loses_nothing_that_was_on_the_disk_and_the_next_start_saves_it(
