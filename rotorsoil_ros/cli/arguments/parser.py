@@ -151,7 +151,7 @@ def _add_modal_verbs(verbs: Verbs) -> None:
 
 
 def _add_import_verbs(verbs: Verbs) -> None:
-    table = add_verb(verbs, 'import', 'exchange:import_table',
+    table = add_verb(verbs, 'import', 'bags:import_table',
                   'turn a measured table (CSV, Excel, UFF 58) into a bag with speed and vectors',
                   case=False)
     table.add_argument('table', metavar='TABLE', type=Path, help='CSV, .xlsx, or .uff')
@@ -170,7 +170,7 @@ def _add_import_verbs(verbs: Verbs) -> None:
             ('phase', 'column of the phase'), ('phase-unit', 'deg or rad'),
             ('phase-sense', 'lag or lead')):
         add(f'--{name}', metavar=name.split('-')[-1].upper(), help=says)
-    export = add_verb(verbs, 'export', 'exchange:export',
+    export = add_verb(verbs, 'export', 'bags:export',
                    'write speed, predicted, measured, residual and zone of a log as a long table',
                    case=False)
     export.add_argument('log', metavar='LOG', type=Path, help='MCAP file or bag')
