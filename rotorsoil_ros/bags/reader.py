@@ -6,13 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 import errno
-from importlib import import_module
 import io
 from itertools import groupby, pairwise
 from pathlib import Path
 import statistics
 import struct
-from types import ModuleType
 from typing import BinaryIO, TypeAlias
 import zlib
 
@@ -66,9 +64,11 @@ class Source:
 
 def sources(path: Path, *, tell: Tell = lambda text: None) -> Counter[Source]:
     """Return how many messages there are of every channel of a bag or MCAP file."""
+    from rotorsoil_ros.bags import foreign  # which itself needs this room
+
     found, cut = Counter[Source](), list[str]()
     for file in files(path):
-        found.update(_foreign().counted(file) if file.suffix in FOREIGN else
+        found.update(foreign.counted(file) if file.suffix in FOREIGN else
                      _counted(file) or _counted_one_by_one(file, cut.append))
     if cut and not found:
         raise InputError(f'{"; ".join(cut)}, where nothing is')
@@ -189,7 +189,9 @@ def _counted_one_by_one(file: Path, tell: Tell) -> Counter[Source]:
 def _chunks(file: Path, wanted: Wanted, tell: Tell) -> Iterator[list[Entry]]:
     """Read wanted messages chunk by chunk; chunks that overlap in time are merged."""
     if file.suffix in FOREIGN:
-        yield from _foreign().portions(file, lambda source: source.encoding == CDR and wanted(
+        from rotorsoil_ros.bags import foreign
+
+        yield from foreign.portions(file, lambda source: source.encoding == CDR and wanted(
             source.topic, source.type), tell)
         return
     with opened(file) as (stream, is_finished):
@@ -206,11 +208,6 @@ def _chunks(file: Path, wanted: Wanted, tell: Tell) -> Iterator[list[Entry]]:
     for source, times in contents.wrong_times.items():
         tell(f'{file}: {source.topic}: {len(times)} messages with an impossible time are left '
              f'out, the first at {times[0]} ns')
-
-
-def _foreign() -> ModuleType:
-    """Return who reads other storages, which itself needs this room."""
-    return import_module('rotorsoil_ros.bags.foreign')
 
 
 def usual_time(stream: BinaryIO) -> int | None:
