@@ -9,7 +9,7 @@ import sqlite3
 from typing import Any
 
 from rotorsoil_ros.bags.metadata import SQLITE
-from rotorsoil_ros.bags.reader import CDR, Entry, Picks, Source, Tell
+from rotorsoil_ros.bags.reader import CDR, Entry, Picks, Source, Tell, Wanted
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP
 from rotorsoil_ros.wire.definitions import ros_name
@@ -24,8 +24,11 @@ def counted(file: Path) -> Counter[Source]:
     return _counted_in_sqlite(file) if file.suffix == SQLITE else _counted_in_ros1(file)
 
 
-def portions(file: Path, picks: Picks, tell: Tell) -> Iterator[list[Entry]]:
+def portions(file: Path, wanted: Wanted, tell: Tell) -> Iterator[list[Entry]]:
     """Read the messages that are wanted in the order of their reception, some at a time."""
+    def picks(source: Source) -> bool:
+        return source.encoding == CDR and wanted(source.topic, source.type)
+
     entries = (_entries_in_sqlite if file.suffix == SQLITE else _entries_in_ros1)(file, picks)
     left_out = 0
     while portion := list(islice(entries, PORTION)):

@@ -68,8 +68,8 @@ def sources(path: Path, *, tell: Tell = lambda text: None) -> Counter[Source]:
 
     found, cut = Counter[Source](), list[str]()
     for file in files(path):
-        found.update(foreign.counted(file) if file.suffix in FOREIGN else
-                     _counted(file) or _counted_one_by_one(file, cut.append))
+        found.update(foreign.counted(file) if file.suffix in FOREIGN
+                     else _counted(file) or _counted_one_by_one(file, cut.append))
     if cut and not found:
         raise InputError(f'{"; ".join(cut)}, where nothing is')
     for text in cut:
@@ -191,8 +191,7 @@ def _chunks(file: Path, wanted: Wanted, tell: Tell) -> Iterator[list[Entry]]:
     if file.suffix in FOREIGN:
         from rotorsoil_ros.bags import foreign
 
-        yield from foreign.portions(file, lambda source: source.encoding == CDR and wanted(
-            source.topic, source.type), tell)
+        yield from foreign.portions(file, wanted, tell)
         return
     with opened(file) as (stream, is_finished):
         contents = Contents(
