@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from itertools import islice
 import math
 from pathlib import Path
@@ -13,6 +14,7 @@ from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case, infinite_range, proportions
 from rotorsoil_ros.case.design.ground import band_contents
+from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.summary import stability_doubts, unstable
 from rotorsoil_ros.errors import InputError, RotorSoilError, solved
 from rotorsoil_ros.ground.accuracy import mapping_error
@@ -20,7 +22,7 @@ from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import DimensionlessTable, require_kind
 from rotorsoil_ros.ground.half_space import a0_range, ELEMENTS_ALGORITHM, InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
-from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil, LEAST_LOSS_FACTOR
 from rotorsoil_ros.ground.layers.table import LayeredTable
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
@@ -244,7 +246,7 @@ def response_band(
                    with_stiffer=any(stiffer))
     others = []
     for place, on_solved, on_stiffer in islice(forms, spread.samples - 1):
-        machine = machine_at(case, model, spread, place)
+        machine = machine_at(case, model, spread, place, Cache(directory))
         solved_on = [on_soil(one, _soil_at(case.soil, model, spread, place), block.contact)
                      for one, block in zip(elements, model.foundations, strict=False)
                      if case.soil is not None]
@@ -254,13 +256,41 @@ def response_band(
 
 
 def machine_at(
-    case: Case, model: CoupledModel, spread: SoilSpread, place: Place,
+    case: Case, model: CoupledModel, spread: SoilSpread, place: Place, cache: Cache | None = None,
 ) -> CoupledModel:
-    """Return the machine at a place of a spread, on the soil that it has there."""
+    """Return the machine at a place of a spread, on the ground that it has there."""
     machine = spread.machine(model, place)
     if case.soil is None or not depends_on_soil(model):
         return machine
+    if spread.changes_ground(place) and case.support.geometry == 'disc':
+        machine = replace(machine, soil_models=tuple(
+            _other_ground(case, index, spread, place, cache)
+            for index in range(len(machine.foundations))))
     return on_soils(machine, [_soil_at(case.soil, model, spread, place)])[0]
+
+
+def _other_ground(
+    case: Case, index: int, spread: SoilSpread, place: Place, cache: Cache | None,
+) -> SoilModel:
+    """Return what a block stands on at a place where the ground itself is another."""
+    assert case.soil is not None
+    lossy = replace(case.soil, loss_factor=max(case.soil.loss_factor, LEAST_LOSS_FACTOR))
+    ground, embedment = spread.ground(case.ground or LayeredSoil((), lossy),
+                                      case.embedments[index], place)
+    contact, (low, high) = case.foundations[index].contact, case.speed_range
+    # Softer soil has shorter waves: its table has to reach further.
+    reach = max(1.0, 0.5 * spread.shear_modulus_factor**0.5)
+    if cache is not None:
+        return thin_layer_model(ground, contact, embedment, cache=cache,
+                                speed_range=(low, reach * high))
+    scaled = proportions(ground, contact, embedment, (low, reach * high))
+    return ThinLayerModel(ground, contact, _solved_once(scaled), embedment)
+
+
+@lru_cache(maxsize=32)
+def _solved_once(scaled: Proportions) -> LayeredTable:
+    """Return the table of a ground that is looked at more than once, as an input by itself."""
+    return scaled.table()
 
 
 def _soil_at(soil: Soil, model: CoupledModel, spread: SoilSpread, place: Place) -> Soil:
@@ -288,7 +318,7 @@ def _other_forms(
     """Return what the ground below each block may be instead, and how much stiffer."""
     stiffer = [0.0] * len(case.foundations)
     if (not spread.model_form or case.soil is None or case.support.geometry != 'disc'
-            or case.support.model not in ('cone', 'infinite_elements')):
+            or case.support.model not in ('cone', 'infinite_elements', THIN_LAYERS)):
         return [], stiffer
     stiffer = [min(mapping_error(block.contact), _LARGEST_MAPPING) for block in case.foundations]
     if case.support.model != 'cone':

@@ -28,15 +28,19 @@ _OIL = re.compile(r'(?:(?:ISO ?)?VG ?)?([0-9]{1,4})', re.IGNORECASE)
 _GRADE = re.compile(r'[Gg] ?([0-9]{1,5}(?:\.[0-9]{1,5})?)')
 
 
-def _number_in(unit: str) -> BeforeValidator:
+def _number_in(unit: str, *, may_be_endless: bool = False) -> BeforeValidator:
     """Return a validator that takes finite numbers, or text of a number and its unit."""
     rule = f'must be a finite number{unit and f" in {unit}"}'
+    if may_be_endless:
+        rule = f'must be a number in {unit}, or .inf'
 
     def validate(value: object) -> float:
         if isinstance(value, str) and (found := _WITH_UNIT.fullmatch(value.strip())):
             value = _converted(float(found[1]), found[2], unit, rule)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError(f'{rule}, got {shown(value)}')
+        if may_be_endless and value == math.inf:
+            return math.inf
         if not math.isfinite(value):
             raise ValueError(f'{rule}, got {value}')
         if abs(value) > _LARGEST_NUMBER:
@@ -122,6 +126,7 @@ FileName = Annotated[str, BeforeValidator(_file)]
 Count = Annotated[int, BeforeValidator(_count)]
 Ratio = Annotated[float, _number_in('')]
 Metre = Annotated[float, _number_in('m')]
+MetreOrEndless = Annotated[float, _number_in('m', may_be_endless=True)]
 MetrePerSecond = Annotated[float, _number_in('m/s')]
 Kilogram = Annotated[float, _number_in('kg')]
 Kilowatt = Annotated[float, _number_in('kW')]

@@ -17,6 +17,7 @@ from rotorsoil_ros.case.quantities import (
     KilogramPerMetre,
     KilogramSquareMetre,
     Metre,
+    MetreOrEndless,
     MetrePerSecond,
     Name,
     Pascal,
@@ -182,6 +183,9 @@ class Uncertainty(Entry):
     shaft_height_factor: Ratio | None = None
     unbalance_factor: Ratio | None = None
     model_form: StrictBool | None = None
+    rock_depth: tuple[Metre, MetreOrEndless] | None = None
+    side_contact: tuple[Ratio, Ratio] | None = None
+    ground_water: StrictBool | None = None
 
 
 Velocities: TypeAlias = tuple[MetrePerSecond, MetrePerSecond, MetrePerSecond]

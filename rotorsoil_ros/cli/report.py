@@ -10,6 +10,7 @@ import numpy as np
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.design.depth import depth_remarks
 from rotorsoil_ros.case.design.ground import model_error
 from rotorsoil_ros.case.design.report import Acceptance
 from rotorsoil_ros.case.journal_entries import BEYOND
@@ -67,7 +68,7 @@ def check(arguments: Namespace) -> int:
     _print_table(_of_damping(case, model, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
-                         warnings(case)):
+                         warnings(case), depth_remarks(case, model, directory)):
         print(f'warning: {warning}')
     growing = list(unstable(table.stability))
     for text in growing:

@@ -6,6 +6,7 @@ import math
 from typing import TypeAlias
 
 from rotorsoil_ros.errors import require
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
@@ -17,12 +18,19 @@ _MOST_SAMPLES = 4096
 
 # Half-widths, and what is no input; everything else is a factor.
 _HALF_WIDTHS = ('poisson_ratio', 'loss_factor')
-_NO_FACTORS = (*_HALF_WIDTHS, 'samples', 'model_form')
+_GROUND = ('rock_depth', 'side_contact', 'ground_water')
+_NO_FACTORS = (*_HALF_WIDTHS, *_GROUND, 'samples', 'model_form')
 
 # Of the soil: what only a support that knows of one depends on.
 SOIL_INPUTS = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor', 'soil_density_factor')
 # Scales every answer alike, so that no machine has to be solved for it.
 UNBALANCE = 'unbalance_factor'
+
+# Steps along the range of what changes the ground, where the answer is far from even in between.
+_STEPS = {'rock_depth': 4, 'side_contact': 2, 'ground_water': 1}
+
+# Poisson's ratio of soil full of water.
+_SATURATED = 0.49
 
 # By the name of an input, its place between the lowest (-1) and the highest (+1) of its range;
 # what is not named is as the case says.
@@ -61,6 +69,13 @@ class SoilSpread:
         Of the height of the shaft above the contact.
     unbalance_factor : float
         Of the unbalance, all planes alike.
+    rock_depth : tuple of two floats or None
+        Between which depths below the surface rigid rock may lie [m]; infinite where there may be
+        none, evenly in the inverse of the depth. None where the case says all that is known.
+    side_contact : tuple of two floats or None
+        Between which shares of the embedment the wall may be welded [-].
+    ground_water : bool
+        Whether ground water may stand at the surface: nu of all soil up to 0.49, its modulus kept.
 
     References
     ----------
@@ -82,6 +97,9 @@ class SoilSpread:
     shaft_stiffness_factor: float = 1.0
     shaft_height_factor: float = 1.0
     unbalance_factor: float = 1.0
+    rock_depth: tuple[float, float] | None = None
+    side_contact: tuple[float, float] | None = None
+    ground_water: bool = False
 
     def __post_init__(self) -> None:
         for own in fields(self):
@@ -91,15 +109,25 @@ class SoilSpread:
         require(0.0 <= self.poisson_ratio < 0.5, 'poisson_ratio', 'in [0, 0.5)',
                 self.poisson_ratio)
         require(0.0 <= self.loss_factor < 1.0, 'loss_factor', 'in [0, 1)', self.loss_factor)
+        if self.rock_depth is not None:
+            low, high = self.rock_depth
+            require(0.0 < low < high, 'rock_depth', 'two rising depths > 0 m, the second may be '
+                    'infinite', low)
+        if self.side_contact is not None:
+            low, high = self.side_contact
+            require(0.0 <= low < high <= 1.0, 'side_contact', 'two rising shares in [0, 1]', low)
         require(3 <= self.samples <= _MOST_SAMPLES, 'samples',
                 'at least 3' if self.samples < 3 else f'at most {_MOST_SAMPLES}', self.samples)
 
     def inputs(self, *, with_soil: bool) -> tuple[str, ...]:
         """Return the names of what is not known exactly, those of the soil first."""
         others = (own.name for own in fields(self)
-                  if own.name not in (*SOIL_INPUTS, 'samples', 'model_form'))
-        return tuple(name for name in (*(SOIL_INPUTS if with_soil else ()), *others)
-                     if getattr(self, name) > (0.0 if name in _HALF_WIDTHS else 1.0))
+                  if own.name not in (*SOIL_INPUTS, *_GROUND, 'samples', 'model_form'))
+        known = tuple(name for name in (*(SOIL_INPUTS if with_soil else ()), *others)
+                      if getattr(self, name) > (0.0 if name in _HALF_WIDTHS else 1.0))
+        ground = tuple(name for name in _GROUND if with_soil and getattr(self, name))
+        # Behind the stiffness of the soil, which comes before all others.
+        return (*known[:1], *ground, *known[1:]) if with_soil else known
 
     def places(self, *, with_soil: bool) -> list[dict[str, float]]:
         """
@@ -144,6 +172,38 @@ class SoilSpread:
             soil.shear_modulus * self.scale('shear_modulus_factor', place),
             min(max(poisson, 0.0), max(soil.poisson_ratio, highest_poisson_ratio)),
             soil.density * self.scale('soil_density_factor', place), max(loss, 0.0))
+
+    def changes_ground(self, place: Place) -> bool:
+        """Return whether the ground at a place has to be solved anew."""
+        return any(name in place and getattr(self, name) for name in _GROUND)
+
+    def ground(
+        self, ground: LayeredSoil, embedment: Embedment, place: Place,
+    ) -> tuple[LayeredSoil, Embedment]:
+        """
+        Return the ground and how a block stands in it at a place, G and density as given.
+
+        Places are rounded to a few along each range: each is a solve.
+        """
+        def share(name: str) -> float:
+            steps = _STEPS[name]
+            return round(0.5 * steps * (place.get(name, -1.0) + 1.0)) / steps
+
+        if self.side_contact is not None and 'side_contact' in place and embedment.depth:
+            low, high = self.side_contact
+            embedment = replace(embedment, side_contact=low + share('side_contact') * (high - low))
+        if self.ground_water and 'ground_water' in place:
+            water = share('ground_water')
+            ground = ground.changed(lambda soil: replace(soil, poisson_ratio=(
+                soil.poisson_ratio + water * max(0.0, _SATURATED - soil.poisson_ratio))))
+        if self.rock_depth is not None and 'rock_depth' in place:
+            shallow, deep = (1.0 / depth for depth in self.rock_depth)
+            inverse = shallow + share('rock_depth') * (deep - shallow)
+            if inverse > 0.0:
+                ground = ground.on_rock(1.0 / inverse)
+            elif ground.below is None:
+                ground = LayeredSoil(ground.layers[:-1], ground.layers[-1].soil)
+        return ground, embedment
 
     def machine(self, model: CoupledModel, place: Place) -> CoupledModel:
         """Return a machine with rotor, bearings and blocks as they are at a place."""

@@ -7,8 +7,13 @@ import pytest
 import yaml
 
 import rotorsoil_ros as rs
+from rotorsoil_ros.case.design.depth import depth_remarks
+from rotorsoil_ros.case.design.influence import influences, velocity
 from rotorsoil_ros.case.summary import derived_quantities, warnings
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.soil import Soil
+from rotorsoil_ros.machine.spread import SoilSpread
 
 FAN = 'rotorsoil_ros/config/plant_fan.yaml'
 SAND = {'shear_modulus': 100e6, 'poisson_ratio': 0.3, 'density': 1900.0, 'loss_factor': 0.05}
@@ -123,3 +128,70 @@ def test_impossible_ground_is_one_line_each(fan, keys, faults):
     assert len(lines) == len(faults)
     assert [line.startswith(fault) for line, fault in zip(
         sorted(lines), sorted(faults), strict=True)] == [True] * len(faults), lines
+
+
+def bounds(machine):
+    found = machine.band(rpm=[1400.0])
+    column = list(found.channels).index('drive_end_housing_x')
+    return found.low[0, column], found.high[0, column]
+
+
+def test_band_sees_the_rock_that_may_be_there(fan):
+    few = {'samples': 8, 'model_form': False}
+    _, high = bounds(fan(uncertainty=few))
+    low, with_rock = bounds(fan(uncertainty={**few, 'rock_depth': [1.5, math.inf]}))
+    shallow = fan(soil=ROCK, support=THIN).response(rpm=[1400.0])
+    on_rock = abs(shallow['drive_end_housing_x'].displacement[0])
+    # At its end alone the band holds the machine on that rock, which is far above all soils.
+    # Edges are straight between some speeds, within 2 %.
+    assert low < on_rock <= with_rock * 1.02
+    assert on_rock > 2.0 * high
+
+
+def test_depth_of_rock_is_an_input_like_any_other(fan):
+    machine = fan(uncertainty={'rock_depth': [1.5, math.inf]})
+    found = influences(machine.case, machine.model, speed=1400.0 * math.pi / 30.0,
+                       channel=list(machine.model.channels).index('drive_end_housing_x'))
+    assert found[0].key == 'rock_depth'
+    # At the deepest end there is none.
+    assert found[0].ends[2] == pytest.approx(
+        velocity(machine.case, fan(support=THIN).model, speed=1400.0 * math.pi / 30.0,
+                 channel=list(machine.model.channels).index('drive_end_housing_x')), rel=1e-6)
+
+
+def test_silence_about_rock_is_told_with_its_cost(fan, cache):
+    machine = fan()
+    [told] = depth_remarks(machine.case, machine.model, cache)
+    assert 'nothing is said of rock; at 1.5 m below the surface it would change' in told
+    known = fan(uncertainty={'rock_depth': [1.5, math.inf]})
+    assert list(depth_remarks(known.case, known.model, cache)) == []
+    layered = fan(soil=ROCK, support=THIN)
+    assert list(depth_remarks(layered.case, layered.model, cache)) == []
+
+
+@pytest.mark.parametrize('keys, fault', [
+    ({'rock_depth': [3.0, 1.5]}, 'uncertainty.rock_depth: must be two rising depths > 0 m'),
+    ({'rock_depth': [0.0, 1.5]}, 'uncertainty.rock_depth: must be two rising depths > 0 m'),
+    ({'rock_depth': [math.inf, 1.5]}, 'uncertainty.rock_depth.0: must be a finite number in m'),
+    ({'side_contact': [0.5, 1.5]}, 'uncertainty.side_contact: must be two rising shares')])
+def test_impossible_spread_is_one_line(fan, keys, fault):
+    with pytest.raises(InputError) as caught:
+        fan(uncertainty=keys)
+    assert str(caught.value).partition('fan.yaml: ')[2].startswith(fault)
+
+
+def test_spread_of_the_ground_changes_what_it_names():
+    soil = Soil(**SAND)
+    ground, hole = LayeredSoil((), soil), Embedment(1.0)
+    spread = SoilSpread(rock_depth=(2.0, math.inf), side_contact=(0.0, 1.0), ground_water=True)
+    assert spread.ground(ground, hole, {}) == (ground, hole)
+    shallow, _ = spread.ground(ground, hole, {'rock_depth': -1.0})
+    assert (shallow.depth, shallow.below) == (2.0, None)
+    middle, _ = spread.ground(ground, hole, {'rock_depth': 0.0})
+    assert middle.depth == pytest.approx(4.0)
+    deep, _ = spread.ground(shallow, hole, {'rock_depth': 1.0})
+    assert deep == ground
+    wet, _ = spread.ground(ground, hole, {'ground_water': 1.0})
+    assert wet.at(0.0).poisson_ratio == pytest.approx(0.49)
+    _, loose = spread.ground(ground, hole, {'side_contact': -1.0})
+    assert loose.side_contact == 0.0

@@ -60,7 +60,7 @@ def band_contents(case: Case) -> str:
     """Return what the edges of the band of a case hold; empty if it has none."""
     spread, knows_soil = case.uncertainty, (
         case.soil is not None and case.support.model in _BY_DISCS)
-    parts = [f'{INPUTS[name].words} (within a factor {getattr(spread, name):g})'
+    parts = [f'{INPUTS[name].words} ({_extent(getattr(spread, name))})'
              for name in spread.inputs(with_soil=knows_soil) if name not in _SOIL]
     if case.soil is None or not knows_soil:
         return '; '.join(parts)
@@ -76,3 +76,10 @@ def band_contents(case: Case) -> str:
     if any(isinstance(block.contact, Rectangle) for block in case.foundations):
         parts.append('discs against rectangles')
     return '; '.join(parts)
+
+
+def _extent(spread: object) -> str:
+    """Return how far an input may be from what the case says."""
+    if isinstance(spread, tuple):
+        return f'{spread[0]:g} to {spread[1]:g}'
+    return 'none to the surface' if spread is True else f'within a factor {spread:g}'

@@ -30,6 +30,15 @@ INPUTS = {
     'shear_modulus_factor': UncertainInput(
         'stiffness of the soil', 'softest soil', 'stiffest soil',
         'measure the velocity of shear waves on site (MASW, cross-hole or seismic cone)'),
+    'rock_depth': UncertainInput(
+        'depth of rock', 'shallowest rock', 'deepest rock',
+        'sink a bore hole to twice the width of the block below its base'),
+    'side_contact': UncertainInput(
+        'contact of the wall', 'least welded wall', 'most welded wall',
+        'ask how the excavation beside the block was filled and compacted'),
+    'ground_water': UncertainInput(
+        'ground water', 'dry soil', 'ground water at the surface',
+        'ask for the ground water level over the year'),
     'poisson_ratio': UncertainInput(
         "Poisson's ratio of the soil", 'lowest nu', 'highest nu',
         'ask for the ground water level: below it take 0.49 for clay'),
