@@ -1,5 +1,6 @@
 """The machine of a case, drawn to scale from the side and from its end."""
 
+from itertools import pairwise
 import math
 from typing import Any
 
@@ -15,6 +16,7 @@ from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.rotor.disc import Disc
 
 STEEL, DISC, CONCRETE, SOIL = '#7d98b3', '#d9a441', '#c9c9c4', '#c8ad7f'
+ROCK = '#8f8f8f'
 HOUSING, STAND, SPRING = '#5b6770', '#a9a9a9', '#b03a2e'
 
 # A housing is drawn so many times as high and wide as the shaft in it, but not smaller than this
@@ -31,13 +33,18 @@ _WINDINGS = 4
 _SMALL = 5.0
 _EDGE: dict[str, Any] = {'edgecolor': 'black', 'linewidth': 0.6}
 _MEGA = 1e-6
+# Layers are told apart by their shade.
+_LAYERS = (SOIL, '#b39468', '#d8c39c', '#a88b62')
+# Of the height of the machine, that the ground below it may take; of a block, the gap beside it.
+_DEEPEST = 1.2
+_GAP = 0.06
 
 
 def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
     """Draw shaft, discs, bearings, blocks and ground of a case, in a width in inches."""
     left, right, reach, top = _extent(case)
     # Room for the labels of discs above, and of bearings to the right.
-    depth = 0.1 * top
+    depth = _drawn_depth(case, top)
     across, up = right - left + 2.0 * reach, top + depth
     height = min(max(0.25 * width + 0.83 * width * up / across, 0.39 * width), 7.4)
     figure = Figure(figsize=(width, height),
@@ -45,7 +52,8 @@ def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
     # Widths in the ratio of the limits: then both views have one scale.
     side, end = figure.subplots(1, 2, width_ratios=[right - left, 2.0 * reach], sharey=True)
     side.set(xlim=(left, right), ylim=(-depth, top), xlabel='y along the shaft [m]',
-             ylabel='z above the ground [m]')
+             ylabel='z above the contact [m]' if any(
+                 one.depth for one in case.embedments) else 'z above the ground [m]')
     end.set(xlim=(-reach, reach), xlabel='x across [m]')
     _draw_side(side, case, in_full=width > _SMALL)
     _draw_end(end, case)
@@ -53,7 +61,7 @@ def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
         axes.set_aspect('equal')
         axes.locator_params(axis='x', nbins=6 if axes is side else 3)
         axes.spines[['top', 'right']].set_visible(False)
-        _draw_ground(axes, rigid=case.support.model == 'rigid')
+        _draw_ground(axes, case, words=axes is side)
     if width <= _SMALL:
         return figure
     given = all(block.height is not None for block in case.foundations)
@@ -81,6 +89,10 @@ def _support(case: Case) -> str:
         return 'ground as its file says'
     if case.soil is None or case.support.model == 'rigid':
         return 'rigid ground'
+    if case.ground is not None and case.ground.layers:
+        count = len(case.ground.layers)
+        return (f'{count} layer{"s" * (count > 1)} on '
+                + ('rigid rock' if case.ground.below is None else 'a half-space'))
     return (f'{case.support.model.replace("_", " ")} on soil of G = '
             f'{1e-6 * case.soil.shear_modulus:g} MPa, c_s = '
             f'{case.soil.shear_wave_speed:.0f} m/s')
@@ -207,13 +219,56 @@ def _housing_size(case: Case, bearing: Bearing) -> float:
     return max(_HOUSING * diameter, _LEAST_HOUSING * case.rotor.shaft_height)
 
 
-def _draw_ground(axes: Axes, *, rigid: bool) -> None:
+def _drawn_depth(case: Case, top: float) -> float:
+    """Return how much of what lies below the contact is drawn [m]: all layers, if not too deep."""
+    if case.ground is None or not case.ground.layers:
+        return 0.1 * top
+    below = case.ground.depth - _surface(case)
+    return min(1.15 * below, _DEEPEST * top) if below > 0.0 else 0.3 * top
+
+
+def _surface(case: Case) -> float:
+    """Return the height of the ground above the contact of the first block [m]."""
+    return case.embedments[0].depth if case.embedments else 0.0
+
+
+def _draw_ground(axes: Axes, case: Case, *, words: bool) -> None:
+    """Draw layers from the surface down, and the hole of each block with what touches its wall."""
     left, right = axes.get_xlim()
-    bottom = axes.get_ylim()[0]
-    axes.add_patch(Box((left, bottom), right - left, -bottom, zorder=0, linewidth=0.0,
-                       facecolor='#999999' if rigid else SOIL, hatch='///' if rigid else '...',
-                       edgecolor='white'))
-    axes.axhline(0.0, color='black', linewidth=0.8, zorder=1)
+    bottom, surface = axes.get_ylim()[0], _surface(case)
+    layers = () if case.ground is None else case.ground.layers
+    on_rock = case.support.model == 'rigid' or (
+        case.ground is not None and case.ground.below is None)
+    ends = [surface - depth for depth in (case.ground.interfaces if case.ground else ())]
+    for index, (high, low) in enumerate(pairwise([surface, *ends, min(bottom, *ends, 0.0) - 1.0])):
+        is_rock = on_rock and index == len(layers)
+        axes.add_patch(Box(
+            (left, max(low, bottom)), right - left, max(high - max(low, bottom), 0.0), zorder=0,
+            linewidth=0.0, facecolor=ROCK if is_rock else _LAYERS[index % len(_LAYERS)],
+            hatch='///' if is_rock else '...', edgecolor='white'))
+        if layers and words and high > bottom:
+            soil = None if is_rock else case.ground.soils[index] if case.ground else None
+            axes.annotate(
+                'rigid rock' if soil is None else f'c_s = {soil.shear_wave_speed:.0f} m/s',
+                (left, 0.5 * (high + max(low, bottom))), xytext=(3, 0), va='center', fontsize=6.5,
+                textcoords='offset points', zorder=1.5,
+                bbox={'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0})
+    axes.axhline(surface, color='black', linewidth=0.8, zorder=0.5)
+    for end in ends:
+        axes.axhline(end, color='black', linewidth=0.6, linestyle=':', zorder=0.5)
+    if surface:
+        _draw_gaps(axes, case, across=not words)
+
+
+def _draw_gaps(axes: Axes, case: Case, *, across: bool) -> None:
+    """Draw where the wall of a block stands free in the ground."""
+    for block, embedment in zip(case.foundations, case.embedments, strict=True):
+        half = _half_width(block) if across else _half_length(block)
+        centre, wide = 0.0 if across else block.centre_y, _GAP * half
+        for edge in (centre - half - wide, centre + half):
+            axes.add_patch(Box((edge, embedment.depth - embedment.free_depth), wide,
+                               embedment.free_depth, zorder=0.4, facecolor='white',
+                               linewidth=0.0))
 
 
 def _label(axes: Axes, text: str, along: float, height: float, *, points: int) -> None:

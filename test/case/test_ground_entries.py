@@ -162,7 +162,7 @@ def test_depth_of_rock_is_an_input_like_any_other(fan):
 def test_silence_about_rock_is_told_with_its_cost(fan, cache):
     machine = fan()
     [told] = depth_remarks(machine.case, machine.model, cache)
-    assert 'nothing is said of rock; at 1.5 m below the surface it would change' in told
+    assert 'nothing is said of rock; at 1.5 m below the surface it would raise' in told
     known = fan(uncertainty={'rock_depth': [1.5, math.inf]})
     assert list(depth_remarks(known.case, known.model, cache)) == []
     layered = fan(soil=ROCK, support=THIN)

@@ -79,6 +79,19 @@ def test_bode_shows_micrometres_and_degrees_of_the_table(fan):
     assert turned['wheel_x'] == pytest.approx(np.rad2deg(np.angle(exact)), abs=0.1)
 
 
+def test_layers_rock_and_the_gap_beside_a_block_are_drawn_to_scale():
+    case = load(FAN, [
+        'support.model=thin_layers', 'foundations.0.embedment=0.8',
+        'foundations.0.side_contact=0.25', 'soil={layers: [{thickness: 1.5, shear_modulus: 1.0e+8,'
+        ' poisson_ratio: 0.3, density: 1900, loss_factor: 0.05}], below: rock}'])
+    side = machine_drawing(case).axes[0]
+    spans = {(round(box.get_y(), 6), round(box.get_y() + box.get_height(), 6))
+             for box in side.patches if isinstance(box, Box)}
+    # Of the contact at 0: the layer from the surface to the rock, and the free part of the wall.
+    assert {(-0.7, 0.8), (0.2, 0.8)} <= spans
+    assert {text.get_text() for text in side.texts} >= {'rigid rock', 'c_s = 229 m/s'}
+
+
 def test_still_directions_of_a_rigid_base_are_not_drawn(tmp_path):
     case = load(CONFIG / 'rk4_rotor_kit.yaml')
     model = coupled_model(case, tmp_path)

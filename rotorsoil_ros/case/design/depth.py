@@ -21,6 +21,9 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 _ROCK = 1.1
 _SPEEDS = 400
 
+# Less than this factor on the highest amplitude is within what any soil does to it.
+_MATTERS = 1.1
+
 
 def depth_remarks(case: Case, model: CoupledModel, directory: Path) -> Iterator[str]:
     """
@@ -55,7 +58,7 @@ def depth_remarks(case: Case, model: CoupledModel, directory: Path) -> Iterator[
     except RotorSoilError:  # beyond the reach of a model: its own error says so
         return
     first, second = (1e6 * float(found.max(initial=0.0)) for found in (without, on_rock))
-    if first > 0.0:
-        yield (f'soil: nothing is said of rock; at {depth:g} m below the surface it would change '
+    if second > _MATTERS * first:
+        yield (f'soil: nothing is said of rock; at {depth:g} m below the surface it would raise '
                f'the highest amplitude of the housings from {first:.3g} to {second:.3g} um '
                'zero-to-peak: say uncertainty.rock_depth, or soil.layers and below')
