@@ -276,6 +276,16 @@ def test_demonstration_without_a_plant_finds_what_was_put_in(tmp_path, capsys):
     assert 'look at wheel at the next stop' in found['next_step']
     assert '<dt>quasi-static</dt>' in page
     assert sheets(out / 'report.html', tmp_path) <= 3
+    pictures = {name: figure for name, _, figure in all_figures(judged(log))}
+    drawn = {line.get_label().split(' (')[0]: (line.get_marker(), line.get_color())
+             for line in pictures['bode_fan_end_housing_x'].axes[0].get_lines()}
+    ways = [drawn[f'measured, {way}'] for way in ('run-up', 'run-down', 'constant speed')]
+    assert len({mark for mark, _ in ways}) == len({colour for _, colour in ways}) == 3
+    lines = {line.get_label(): line for line in pictures['trend'].axes[1].get_lines()}
+    measured, predicted = (lines[f'fan_end_housing_x {what}'] for what in ('measured',
+                                                                           'predicted'))
+    assert measured.get_color() != predicted.get_color()
+    assert measured.get_marker() != predicted.get_marker()
 
 
 def test_rotor_kit_is_shown_as_it_is(kit_log, tmp_path, capsys):

@@ -5,21 +5,29 @@ import math
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 import numpy as np
 
-from rotorsoil_ros.arrays import BoolArray, FloatArray
+from rotorsoil_ros.arrays import BoolArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.figures.response import COLOURS
+from rotorsoil_ros.figures.response import COLOURS, legend_below
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.criteria import answer, Expectation
 from rotorsoil_ros.monitor.passage import Passage, PeakPair
 from rotorsoil_ros.monitor.points import ChannelPoints
+from rotorsoil_ros.monitor.vectors.history import STEADY
 from rotorsoil_ros.units import rad_s_to_rpm
 
 PREDICTED, MEASURED, LEFT_OUT = COLOURS[0], COLOURS[1], '#9a9a9a'
-ZONE_COLOURS = {'A/B': '#009e73', 'B/C': '#e69f00', 'C/D': '#c0392b'}
+# Apart from those of channels: limits are no measurement.
+ZONE_COLOURS = {'A/B': '#6b8e23', 'B/C': '#b8860b', 'C/D': '#8b0000'}
+# Measured while the speed rises, falls, and stays: mark, colour and words.
+_WAYS = {1: ('^', COLOURS[1], 'run-up'), -1: ('v', COLOURS[3], 'run-down'),
+         0: ('o', COLOURS[2], 'constant speed')}
+# Share of its colour that a prediction has beside its measurement.
+_TINT = 0.55
 
 _MICRO = 1e6
 _MILLI = 1e3
@@ -34,7 +42,7 @@ def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
                bode(comparison, points))
         if np.isfinite(points.phase).any():
             yield (f'polar_{points.channel}', f'{points.channel}: the vectors',
-                   polar(points, comparison.run.title))
+                   polar(points, comparison))
     if comparison.points:  # everything measured may have been refused
         yield 'trend', 'Trend', trend(comparison)
         yield 'residuals', 'Measured less predicted vectors', residuals(comparison)
@@ -58,7 +66,7 @@ def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
     _draw_band(amplitude, phase, points)
     measured = _MICRO * points.amplitude
     speed = rad_s_to_rpm(points.speed)
-    for chosen, style in _kinds(points):
+    for chosen, style in _kinds(points, comparison):
         amplitude.plot(speed[chosen], measured[chosen], **style)
         phase.plot(speed[chosen], np.rad2deg(_wrapped(points.phase[chosen])),
                    **{**style, 'label': None})
@@ -75,7 +83,7 @@ def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
               yticks=range(-180, 181, 90))
     if len(speed) and np.isfinite(speed).any():
         phase.set_xlim(float(np.nanmin(speed)), float(np.nanmax(speed)) + 1e-6)
-    amplitude.legend(fontsize=7)
+    legend_below(figure, amplitude, columns=3)
     for axes in (amplitude, phase):
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize=8)
@@ -122,14 +130,33 @@ def _draw_band(amplitude: Axes, phase: Axes, points: ChannelPoints) -> None:
         phase.fill_between(speed, low - 360.0 * turn, high - 360.0 * turn, **style)
 
 
-def _kinds(points: ChannelPoints) -> Iterator[tuple[BoolArray, dict[str, Any]]]:
-    """Yield the points that are used and those left out, by reason, with how they are drawn."""
-    yield points.used, {'color': MEASURED, 'marker': 'o', 'markersize': 3.0, 'linestyle': 'none',
-                        'label': f'measured, used ({int(points.used.sum())})'}
+def _kinds(
+    points: ChannelPoints, comparison: Comparison,
+) -> Iterator[tuple[BoolArray, dict[str, Any]]]:
+    """Yield the points that are used, by where the speed goes, and those left out, by reason."""
+    ways = _ways(points, comparison)
+    for way, (marker, colour, words) in _WAYS.items():
+        chosen = points.used & (ways == way)
+        if chosen.any():
+            yield chosen, {'color': colour, 'marker': marker, 'markersize': 3.0,
+                           'linestyle': 'none',
+                           'label': f'measured, {words} ({int(chosen.sum())})'}
     for marker, (reason, number) in zip('x+1234*', points.excluded.items(), strict=False):
         chosen = np.array([str(own) == reason for own in points.reason])
         yield chosen, {'color': LEFT_OUT, 'marker': marker, 'markersize': 3.5,
                        'linestyle': 'none', 'label': f'measured, {reason} ({number})'}
+
+
+def _ways(points: ChannelPoints, comparison: Comparison) -> IntArray:
+    """Return whether the speed rises (1), falls (-1) or stays (0) at each point, (n,)."""
+    run = comparison.run
+    if not len(run.time):
+        return np.zeros(len(points.stamp_ns), dtype=int)
+    at = (points.stamp_ns - run.stamp_ns[0]) * 1e-9
+    # Over a second, so that neither a jitter nor two speeds of one stamp tells a direction.
+    before, after = (np.interp(at + half, run.time, run.speed) for half in (-0.5, 0.5))
+    moving = np.abs(after - before) > STEADY * np.abs(before)
+    return np.where(moving, np.sign(after - before), 0.0).astype(int)
 
 
 def _draw_criticals(axes: Axes, expectation: Expectation) -> None:
@@ -142,14 +169,14 @@ def _wrapped(phase: FloatArray) -> FloatArray:
     return np.asarray(np.angle(np.exp(1j * phase)))
 
 
-def polar(points: ChannelPoints, title: str) -> Figure:
+def polar(points: ChannelPoints, comparison: Comparison) -> Figure:
     """Draw the vectors of a channel, predicted as a line, measured as dots."""
     figure = Figure(figsize=(7.5, 5.4), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
     given = np.isfinite(points.predicted)
     order = np.argsort(points.speed[given], kind='stable')
     line = points.predicted[given][order]
-    for chosen, style in _kinds(points):
+    for chosen, style in _kinds(points, comparison):
         axes.plot(points.phase[chosen], _MICRO * points.amplitude[chosen], **style)
     shown = _MICRO * points.amplitude[np.isfinite(points.phase)]
     largest = 1.15 * max(float(np.nanmax(shown, initial=0.0)), 1e-9)
@@ -160,8 +187,8 @@ def polar(points: ChannelPoints, title: str) -> Figure:
     axes.set_ylim(0.0, largest)
     axes.tick_params(labelsize=7)
     axes.legend(fontsize=7, loc='upper left', bbox_to_anchor=(1.02, 1.0))
-    axes.set_title(f'{title}: {_label(points)}, 1X [{_unit(points.channel)}, zero-to-peak]',
-                   fontsize=9)
+    axes.set_title(f'{comparison.run.title}: {_label(points)}, 1X [{_unit(points.channel)}, '
+                   'zero-to-peak]', fontsize=9)
     return figure
 
 
@@ -183,8 +210,8 @@ def trend(comparison: Comparison) -> Figure:
         bottom.plot(time, scale * points.amplitude, '.', color=colour, markersize=3.5,
                     label=f'{_label(points)} measured')
         order = np.argsort(time, kind='stable')
-        bottom.plot(time[order], (scale * np.abs(points.predicted))[order], color=colour,
-                    linewidth=1.0, label=f'{_label(points)} predicted')
+        bottom.plot(time[order], (scale * np.abs(points.predicted))[order], linewidth=1.4,
+                    color=_tinted(colour), label=f'{_label(points)} predicted')
     if housings:
         _draw_zones(bottom, comparison)
     bottom.set_yscale('log')
@@ -197,6 +224,11 @@ def trend(comparison: Comparison) -> Figure:
         axes.margins(x=0.01)
     figure.suptitle(f'{comparison.run.title}: trend', fontsize=10)
     return figure
+
+
+def _tinted(colour: str) -> tuple[float, ...]:
+    """Return a colour with white in it."""
+    return tuple(1.0 - _TINT * (1.0 - part) for part in to_rgb(colour))
 
 
 def _draw_zones(axes: Axes, comparison: Comparison) -> None:
@@ -233,7 +265,7 @@ def residuals(comparison: Comparison) -> Figure:
     plane.axhline(0.0, color='black', linewidth=0.5)
     plane.axvline(0.0, color='black', linewidth=0.5)
     plane.set_aspect('equal', adjustable='datalim')
-    size.legend(fontsize=7)
+    legend_below(figure, size, columns=3)
     size.set_title('size; grey: left out', fontsize=8)
     plane.set_title('vectors that are used', fontsize=8)
     figure.suptitle(f'{comparison.run.title}: residuals', fontsize=10)

@@ -120,7 +120,9 @@ def _modes(report: DesignReport) -> str:
         [[one.name, f'{one.critical.speed_rpm:.0f}', f'{one.critical.damping_ratio:.1%}',
           '-' if one.split is None else one.split.words(0).split(',')[0],
           f'{one.margin:.0%}', f'{one.required:.0%}' if one.required else 'none',
-          'too near' if one.is_missed else 'kept'] for one in nearest])
+          'too near' if one.is_missed else 'kept'] for one in nearest]) + ''.join(
+        f'<p class="small">{escape(one.name)} is damped by {escape(one.split.words(0))}.</p>'
+        for one in nearest[:1] if one.split is not None)
 
 
 def _stability(report: DesignReport) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import across
-from rotorsoil_ros.figures.response import COLOURS, draw_shape, FELT, tidy, title_of
+from rotorsoil_ros.figures.response import COLOURS, draw_shape, FELT, legend_below, tidy, title_of
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
@@ -47,7 +47,7 @@ def campbell_diagram(
     figure = Figure(figsize=(7.5, 7.0), layout='constrained')
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[1.7, 1.0])
     highest = _HIGHEST_ORDER * case.speed_range[1]
-    for row, mode in _branches(found, highest):
+    for number, (row, mode) in enumerate(_branches(found, highest), start=1):
         speed = rad_s_to_rpm(found.speed[row])
         whirl = int(np.sign(found.whirl[row, mode].sum() + 0.5))
         _, colour, line = _WHIRLS[whirl]
@@ -55,8 +55,13 @@ def campbell_diagram(
         # What is hardly felt stays pale.
         damping = found.damping_ratio[row, mode]
         pale = 1.0 if np.median(damping) < 0.5 / FELT else 0.4
-        top.plot(speed, rad_s_to_hz(found.omega[row, mode]), alpha=pale, **style)
-        bottom.plot(speed, 100.0 * damping, alpha=pale, **style)
+        for axes, values in ((top, rad_s_to_hz(found.omega[row, mode])),
+                             (bottom, 100.0 * damping)):
+            axes.plot(speed, values, alpha=pale, **style)
+            # The same number says which damping is that of which frequency.
+            axes.annotate(str(number), (speed[-1], values[-1]), fontsize=7, color=colour,
+                          xytext=(4 + 9 * (number % 2), 0), textcoords='offset points',
+                          va='center', annotation_clip=True)
     _draw_criticals(top, criticals)
     turning = np.array([0.0, case.speed_range[1]])
     top.plot(rad_s_to_rpm(turning), rad_s_to_hz(turning), color='black', linewidth=0.8,
@@ -66,10 +71,12 @@ def campbell_diagram(
     _scale_damping(bottom)
     for label, colour, line in _WHIRLS.values():
         top.plot([], [], color=colour, linestyle=line, label=label)
-    top.legend(fontsize=7, loc='upper left')
+    legend_below(figure, top)
     tidy(top)
     tidy(bottom)
-    figure.suptitle(f'{case.name}: Campbell diagram; pale: amplification factor below {FELT:g}',
+    bottom.set_xlim(right=1.06 * rad_s_to_rpm(case.speed_range[1]))
+    figure.suptitle(f'{case.name}: Campbell diagram; pale: amplification factor below {FELT:g}; '
+                    'one number is one mode',
                     fontsize=10)
     return figure
 
@@ -126,7 +133,7 @@ def critical_shapes(
         axes.set_ylim(-1.15, 1.15)
         axes.set_title(title_of(critical), fontsize=8)
         axes.set_ylabel('shape [-]', fontsize=8)
-    rows[0].legend(fontsize=6, ncols=4)
+    legend_below(figure, rows[0])
     rows[-1].set_xlabel('y along the shaft [m]')
     figure.suptitle(f'{case.name}: modes at critical speeds; dotted: bearings, broad: discs',
                     fontsize=10)
@@ -223,7 +230,7 @@ def mass_ratios(case: Case, model: CoupledModel) -> Figure:
     for axes, channel in zip(panels, heaviest, strict=True):
         axes.set_ylabel(f'{channel}, zero-to-peak [um]')
         tidy(axes)
-    panels[0].legend(fontsize=7, title='mass of the blocks', title_fontsize=7)
+    legend_below(figure, panels[0], columns=2)
     panels[1].set_xlabel('speed [rpm]')
     figure.suptitle(f'{case.name}: blocks of other mass, with inertia in proportion, same soil',
                     fontsize=10)

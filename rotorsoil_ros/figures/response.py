@@ -106,8 +106,7 @@ def support(case: Case, model: CoupledModel) -> Figure:
         column[0].set_ylabel(f'Re 1/N, spring [{stiffness}]')
         column[1].set_ylabel(f'Im 1/N, damping [{stiffness}]')
         column[2].set(ylabel=f'compliance |N| [{compliance}]', xlabel='frequency [Hz]')
-        if column[0].get_lines():
-            column[0].legend(fontsize=7)
+    legend_below(figure, *grid[0], columns=6)
     for axes in grid.flat:
         tidy(axes)
     figure.suptitle(f'{case.name}: soil below the massless contact, one direction at a time',
@@ -134,8 +133,7 @@ def bode(predictor: Predictor, channels: Sequence[Channel], title: str) -> Figur
     amplitude.set_ylabel(f'amplitude, zero-to-peak [u{channels[0].unit}]')
     phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
               yticks=range(-180, 181, 90))
-    if amplitude.get_lines():
-        amplitude.legend(fontsize=7, ncols=2)
+    legend_below(figure, amplitude)
     tidy(amplitude)
     tidy(phase)
     figure.suptitle(title, fontsize=10)
@@ -221,7 +219,7 @@ def shapes(case: Case, model: CoupledModel, criticals: Sequence[CriticalSpeed]) 
                    _MICRO * np.real(np.array(housings) * np.exp(-1j * angle)))
         axes.set_ylabel('deflection [um]', fontsize=8)
         axes.set_title(title_of(critical), fontsize=8)
-    rows[0].legend(fontsize=6, ncols=3)
+    legend_below(figure, rows[0])
     rows[-1].set_xlabel('y along the shaft [m]')
     figure.suptitle(f'{case.name}: response to its unbalance when the shaft is bent most; '
                     'dotted: bearings, broad: discs', fontsize=9)
@@ -271,6 +269,17 @@ def trend(
     return figure
 
 
+def legend_below(figure: Figure, *sources: Axes, columns: int = 4) -> None:
+    """Name what the axes show below them all, where it hides no data; each name once."""
+    named: dict[str, Any] = {}
+    for axes in sources:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    if named:
+        figure.legend(list(named.values()), list(named), fontsize=7, ncols=columns,
+                      loc='outside lower center')
+
+
 def tidy(axes: Axes) -> None:
     """Give axes a light grid and small figures."""
     axes.grid(alpha=0.3)
@@ -303,7 +312,7 @@ def compliance_figure(name: str, block: Foundation, infinite: InfiniteElementMod
         axes.set_title(title, fontsize=8)
     for axes in grid[-1]:
         axes.set_xlabel('a0 [-]')
-    grid[0, 0].legend(fontsize=7)
+    legend_below(figure, grid[0, 0], grid[0, 2])
     length = 'r0' if isinstance(block.contact, Circle) else 'b'
     figure.suptitle(f'{name}: compliance of the soil below {block.name} over omega {length} / c_s;'
                     f' nu = {soil.poisson_ratio:g}, eta = {soil.loss_factor:g}', fontsize=9)
@@ -321,8 +330,8 @@ def _draw_dof(
                   label='infinite elements')
     for part, line, name in ((np.real, '-', 'real'), (np.imag, '--', 'imaginary')):
         share = part(cone - infinite) / np.abs(infinite)
-        difference.plot(a0, _PERCENT * share, color='black', linestyle=line, label=name)
-    difference.legend(fontsize=6)
+        difference.plot(a0, _PERCENT * share, color='black', linestyle=line,
+                        label=f'difference, {name} part')
     for axes in (real, imaginary, difference):
         axes.axhline(0.0, color='black', linewidth=0.5)
         tidy(axes)

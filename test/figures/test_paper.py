@@ -62,6 +62,15 @@ def test_figure_9_has_no_peak_on_soil_as_high_as_on_rigid_ground(figures):
     assert max(soil) < 1e-3 * rigid
 
 
+def test_figure_9_is_drawn_to_the_scale_of_the_soil(figures):
+    numbers = {name: value for name, value, _ in peak_numbers(figures['figure_9'])}
+    soil = max(value for name, value in numbers.items()
+               if 'mf/m' in name and not name.endswith('where'))
+    _, top = figures['figure_9'].figure.axes[0].get_ylim()
+    assert soil < top < 10.0 * soil
+    assert top < 1e-3 * numbers['figure_9: peak below 100 Hz of disc_1_x rigid']
+
+
 def test_page_quotes_what_is_computed(case, infinite, figures):
     page = (ROOT / 'docs' / 'paper.md').read_text(encoding='utf-8')
     numbers = {name: value for name, value, _ in claim_numbers(case, infinite)}

@@ -12,9 +12,10 @@ from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.cli import main
+from rotorsoil_ros.figures.comparison import ZONE_COLOURS
 from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.figures.modal import modal_figures
-from rotorsoil_ros.figures.response import all_figures, trend
+from rotorsoil_ros.figures.response import all_figures, COLOURS, trend
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
@@ -199,8 +200,37 @@ def test_machine_whose_modes_are_not_known_is_drawn_without_them(tmp_path, capsy
                  f'support={{model: table, file: {tmp_path / "s.csv"}}}', '--set',
                  'foundations.0.mass=900', '--cache', str(tmp_path / 'cache')]) == 0
     said = capsys.readouterr()
-    assert said.err.startswith('no pictures campbell, critical_shapes, orbits, shapes: ')
+    assert said.err.startswith('no pictures campbell, critical_shapes, damping, orbits, '
+                                   'shapes: ')
     assert 'support.file: ' in said.err
     drawn = {path.stem for path in (tmp_path / 'plots').iterdir()}
     assert {'machine', 'bode_discs', 'polar'} <= drawn
     assert not {'campbell', 'orbits', 'shapes'} & drawn
+
+
+def test_no_legend_lies_over_data(fan):
+    case, _, figures = fan
+    model = coupled_model(case, Path('unused'))
+    every = {**figures, **dict(modal_figures(case, model))}
+    for name, figure in every.items():
+        figure.savefig(BytesIO())  # lays it out
+        assert [axes for axes in figure.axes if axes.get_legend() is not None] == [], name
+        for legend in figure.legends:
+            box = legend.get_window_extent()
+            assert not any(box.overlaps(axes.get_window_extent()) for axes in figure.axes), name
+
+
+def test_campbell_gives_one_number_to_a_mode_in_both_panels(fan):
+    case, _, _ = fan
+    figure = dict(modal_figures(case, coupled_model(case, Path('unused'))))['campbell']
+    top, bottom = figure.axes
+    numbers = [sorted(text.get_text() for text in axes.texts if text.get_text().isdigit())
+               for axes in (top, bottom)]
+    assert numbers[0] == numbers[1] != []
+    for axes in (top, bottom):
+        lines = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+        assert len(lines) == len(numbers[0])
+
+
+def test_limits_and_channels_differ_in_colour():
+    assert not set(ZONE_COLOURS.values()) & set(COLOURS)
