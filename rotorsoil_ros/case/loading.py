@@ -70,6 +70,7 @@ def reload(file: Path, *, cache_directory: Path | None) -> Machine:
         If the case is wrong or cannot be solved.
 
     """
+    config.load(file, cache_directory=cache_directory)  # what is wrong with it is told as it is
     directory = cache.directory(cache_directory)
     tabulate([file], directory, tell=lambda text: None)
     return _complete(file, cache_directory)

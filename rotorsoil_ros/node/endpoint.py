@@ -8,7 +8,6 @@ from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from rotorsoil_ros.case import config
 from rotorsoil_ros.case.loading import reload
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
@@ -66,8 +65,7 @@ class Watch:
         except InputError as error:
             raise InputError(f'parameter {name}.speed: {error}') from error
         self._subscribe()
-        self._reloader = Reloader(
-            node, name, check=self._check, load=self._load, take=self.take_machine)
+        self._reloader = Reloader(node, name, load=self._load, take=self.take_machine)
 
     def begin(self, now_ns: int) -> None:
         """Greet, and answer from now on."""
@@ -138,9 +136,6 @@ class Watch:
         """Have the band of what is predicted computed, and what else it is judged by."""
         self._bench.ask(self.name, self._machine, self._unbalance(),
                         self.monitor.judge.take_criteria)
-
-    def _check(self) -> None:
-        config.load(self._settings.case_file(self.name), cache_directory=self._settings.cache)
 
     def _load(self) -> Machine:
         return reload(self._settings.case_file(self.name), cache_directory=self._settings.cache)

@@ -9,7 +9,6 @@ from std_srvs.srv import Trigger
 
 from rotorsoil_ros.background import Errand
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.errors import RotorSoilError
 
 RELOAD_GLANCE_S = 0.05
 
@@ -18,17 +17,17 @@ class Reloader:
     """
     The service `~/<machine>/reload`, which answers when the outcome is known.
 
-    A case file that is wrong is refused at once. The table of one that is right is computed by
-    another process, for which a thread waits; the executor only swaps what is ready, so that a
-    speed is answered from the old case or from the new one.
+    A thread reads the case file, which may have to solve oil films for that, and waits for the
+    table, which another process computes; the executor only swaps what is ready, so that a speed
+    is answered from the old case or from the new one.
     """
 
     def __init__(
-        self, node: LifecycleNode, name: str, *, check: Callable[[], object],
-        load: Callable[[], Machine], take: Callable[[Machine], str],
+        self, node: LifecycleNode, name: str, *, load: Callable[[], Machine],
+        take: Callable[[Machine], str],
     ) -> None:
         self._node, self._name = node, name
-        self._check, self._load, self._take = check, load, take
+        self._load, self._take = load, take
         self._errand: Errand[Machine] | None = None
         self._asked: tuple[Any, Any] | None = None  # response and header of who waits
         self._timer = node.create_timer(
@@ -50,11 +49,6 @@ class Reloader:
         del request
         if self._errand is not None:
             response.message = f'{self._name}: a reload is under way'
-            return response
-        try:
-            self._check()
-        except (RotorSoilError, OSError) as error:
-            response.message = f'{error}; the old case stays'
             return response
         errand = Errand(self._load, name=f'reload {self._name}')
         if not errand.has_begun:
