@@ -243,7 +243,8 @@ def unstable(found: Stability) -> Iterator[str]:
     for one in found.instabilities:
         low, high = rad_s_to_rpm(one.low), rad_s_to_rpm(one.high)
         everywhere = (one.low, one.high) == found.span
-        where = f'at all speeds looked at, {low:g} to {high:g} rpm' if everywhere else (
+        where = f'at {low:.6g} rpm' if low == high else (
+            f'at all speeds looked at, {low:g} to {high:g} rpm' if everywhere else
             f'from {low:.6g} to {high:.6g} rpm')
         how = 'creeps away without whirling' if not one.whirl else (
             f'{"forward" if one.whirl > 0 else "backward"} whirl at '

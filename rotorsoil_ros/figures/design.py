@@ -5,6 +5,7 @@ from html import escape
 import json
 import math
 from pathlib import Path
+import textwrap
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -86,7 +87,8 @@ def design_page(machine: Machine, report: DesignReport) -> str:
 
 
 def _short(lines: Sequence[str]) -> list[str]:
-    return [line if len(line) <= 3 * _LONGEST else f'{line[:3 * _LONGEST]}...' for line in lines]
+    return [textwrap.shorten(line, 3 * _LONGEST, placeholder=' ... (report.json)')
+            for line in lines]
 
 
 def _housings(report: DesignReport) -> str:
