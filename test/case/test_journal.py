@@ -243,6 +243,9 @@ def test_films_are_warned_of(file):
                                'radial_clearance?'),
     ('rotor.bearings.0.stiffness={xx: 1e8, zz: 1e8}',
      'rotor.bearings.0: needs either journal or stiffness and damping, got journal and stiffness'),
+    ('rotor.bearings.0.load=[0, 0]', f'{SAYS}: load must give a Sommerfeld number of 1e-05 to '
+                                     '1e+06 at 7500 rpm, got inf with 0 N and 0.02 Pa s'),
+    ('rotor.bearings.0.load=[0, -1.0e9]', f'{SAYS}: load must give a Sommerfeld number of'),
     ('rotor.bearings.0.journal=null', 'rotor.bearings.0.stiffness: is missing'),
     ('speed_range_rpm=[0, 5000]', f'{SAYS}: film must be at least 1.6 um thick (0.02 of the '
                                   'radial clearance) at the lowest speed, which it is from '),

@@ -26,6 +26,9 @@ _PER_OCTAVE = 4
 # the first one above is found.
 THINNEST_FILM, _FOUND = 0.02, 1e-3
 
+# Sommerfeld numbers beyond which the film is thinner than that, or the load is none.
+_HEAVIEST, _LIGHTEST = 1e-5, 1e6
+
 # Share of the last speed at which a film is looked for at all.
 _SLOWEST = 1e-4
 
@@ -235,6 +238,7 @@ def tabulated(
 
     """
     low, high = span
+    _require_bearable(bearing, viscosity, load, high)
     slowest = max(low, _SLOWEST * high)
     count = 1 + max(2, math.ceil(_PER_OCTAVE * math.log2(high / slowest)))
     speeds = np.geomspace(slowest, high, count)
@@ -250,6 +254,21 @@ def tabulated(
             f'radial clearance) at the lowest speed, which it is from '
             f'{math.ceil(rad_s_to_rpm(known)):g} rpm on, got {rad_s_to_rpm(low):g} rpm')
     return found
+
+
+def _require_bearable(
+    bearing: JournalBearing, viscosity: Viscosity, load: FloatArray, speed: float,
+) -> None:
+    """Refuse what no film carries, and what is no load, before it is looked for."""
+    [thick] = viscosity.at(np.array([speed])).tolist()
+    unit = thick * speed * bearing.radius**3 * bearing.length / bearing.radial_clearance**2
+    carried = float(np.hypot(*load))
+    number = unit / (math.pi * carried) if carried > 0.0 else math.inf
+    if not _HEAVIEST <= number <= _LIGHTEST:
+        raise RotorSoilError(
+            f'load must give a Sommerfeld number of {_HEAVIEST:g} to {_LIGHTEST:g} at '
+            f'{rad_s_to_rpm(speed):g} rpm, got {number:.3g} with {carried:g} N and '
+            f'{thick:.4g} Pa s')
 
 
 def _slowest(
