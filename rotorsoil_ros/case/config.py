@@ -342,7 +342,9 @@ class _Builder:
             path = self.faults.path.parent / file
             if file not in self.files:
                 self.files[file] = stiffness_file.text_of(path)
-            tables.append(stiffness_file.read(path, speed_range, text=self.files[file]))
+            tables.append(stiffness_file.read(
+                path, speed_range, text=self.files[file],
+                cut_offs_hz=entries.support.cut_offs_hz or ()))
         return tuple(tables)
 
     def _refuse_unreachable_soil(self, case: Case) -> None:

@@ -182,7 +182,7 @@ def _identity(model: SoilModel) -> object:
         return ['layers', LAYERS_ALGORITHM, model.ground, model.contact, model.embedment,
                 float(model.table.edges[-1])]
     if isinstance(model, ComplianceTable):
-        return ['table', model.omega, model.values]
+        return ['table', model.omega, model.values, *model.cut_offs]
     return model
 
 

@@ -11,6 +11,7 @@ from rotorsoil_ros.case.quantities import (
     Celsius,
     Count,
     FileName,
+    Hertz,
     Kilogram,
     KilogramMetre,
     KilogramPerCubicMetre,
@@ -73,6 +74,7 @@ class SupportEntry(Entry):
     model: Literal['rigid', 'cone', 'infinite_elements', 'thin_layers', 'table']
     geometry: Literal['disc', 'plane_strain', 'plane_stress'] = 'disc'
     file: FileName | None = None
+    cut_offs_hz: list[Hertz] | None = None
 
 
 class FoundationEntry(Entry):

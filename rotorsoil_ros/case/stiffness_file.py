@@ -1,6 +1,8 @@
 """What somebody else computed or measured of the ground: a dynamic stiffness in a CSV file."""
 
+from collections.abc import Sequence
 import csv
+from dataclasses import replace
 import math
 from pathlib import Path
 
@@ -24,11 +26,17 @@ _LARGEST_BYTES = 32 * 1024 * 1024
 _SWING = 1e-3
 _PLACES = 8
 
+# Rows that make a piece of a curve between two cut-offs: a cubic of its own, and one to spare.
+_ROWS_OF_A_PIECE = 4
+
 # Of a frequency: 1 Hz and 60 rpm differ in the last digit.
 _ROUND_OFF = 1e-12
 
 
-def read(path: Path, covering: tuple[float, float], *, text: str | None = None) -> ComplianceTable:
+def read(
+    path: Path, covering: tuple[float, float], *, text: str | None = None,
+    cut_offs_hz: Sequence[float] = (),
+) -> ComplianceTable:
     """
     Read the dynamic stiffness of a massless contact and return what it gives way by.
 
@@ -42,6 +50,8 @@ def read(path: Path, covering: tuple[float, float], *, text: str | None = None) 
         Frequencies that it has to know [rad/s].
     text : str or None
         What the file says, where that is known already; the path then only names it.
+    cut_offs_hz : sequence of float
+        Where waves of a layer begin to travel [Hz]; each is at the nearest row.
 
     Raises
     ------
@@ -63,9 +73,8 @@ def read(path: Path, covering: tuple[float, float], *, text: str | None = None) 
         unit = np.broadcast_to(np.eye(len(free)), part.shape)
         compliance[np.ix_(np.arange(len(omega)), free, free)] = np.linalg.solve(part, unit)
         # Solving leaves round-off between ij and ji.
-        table = ComplianceTable(omega, 0.5 * (compliance + compliance.swapaxes(1, 2)))
-        _require_passive_curve(path, table, free)
-        return table
+        whole = ComplianceTable(omega, 0.5 * (compliance + compliance.swapaxes(1, 2)))
+        return _passive_curve(path, _cut(whole, cut_offs_hz), free)
     except InputError:
         raise
     except np.linalg.LinAlgError as error:
@@ -208,20 +217,55 @@ def _require_passivity(path: Path, stiffness: ComplexArray, omega: FloatArray) -
                          f'{omega[worst]:g} rad/s')
 
 
-def _require_passive_curve(path: Path, table: ComplianceTable, free: IntArray) -> None:
-    """Refuse what loses energy at its frequencies but gives some on the way between them."""
+def _passive_curve(path: Path, table: ComplianceTable, free: IntArray) -> ComplianceTable:
+    """
+    Return a table whose curve loses energy between its frequencies too, or refuse it.
+
+    Where waves of a layer begin to travel the loss rises from that of the soil alone as a root
+    does, and a smooth curve over that place swings below it: there the curve is cut.
+    """
+    while True:
+        loss, below = _least_loss(table, free)
+        if loss >= -_SWING:
+            return table
+        cut = [replace(table, cut_offs=tuple(sorted({*table.cut_offs, row})))
+               for row in (below, below + 1) if _may_be_cut(table, row)]
+        best = max(cut, key=lambda one: _least_loss(one, free)[0], default=table)
+        if not _least_loss(best, free)[0] > loss:
+            first, last = (rad_s_to_hz(one) for one in table.omega[below:below + 2])
+            raise InputError(
+                f'{path}: changes too abruptly for a smooth curve through its '
+                f'{len(table.omega)} frequencies: between {first:.6g} and {last:.6g} Hz the '
+                'ground would give energy; add frequencies there, or mend the jump')
+        table = best
+
+
+def _cut(table: ComplianceTable, cut_offs_hz: Sequence[float]) -> ComplianceTable:
+    """Return a table whose curve ends at given frequencies."""
+    for place in sorted(set(cut_offs_hz)):
+        row = int(np.abs(table.omega - hz_to_rad_s(place)).argmin())
+        if not _may_be_cut(table, row):
+            raise RotorSoilError(
+                f'cut_offs_hz must leave {_ROWS_OF_A_PIECE} rows to the ends of the table and to '
+                f'the next, got {place:g} Hz')
+        table = replace(table, cut_offs=(*table.cut_offs, row))
+    return table
+
+
+def _may_be_cut(table: ComplianceTable, row: int) -> bool:
+    """Return whether a curve may end at a row: what is left must still be one on either side."""
+    ends = (0, *table.cut_offs, len(table.omega) - 1)
+    return all(abs(row - end) >= _ROWS_OF_A_PIECE for end in ends)
+
+
+def _least_loss(table: ComplianceTable, free: IntArray) -> tuple[float, int]:
+    """Return the least loss between rows, of the diagonal, and the row below it."""
     share = np.arange(1, _PLACES) / _PLACES
     between = (table.omega[:-1, None] + np.diff(table.omega)[:, None] * share).ravel()
     values = table.compliance(between)[:, free[:, None], free]
     loss = np.linalg.eigvalsh(-values.imag / _units(table.values[:, free[:, None], free]))[:, 0]
     worst = int(loss.argmin())
-    if not loss[worst] >= -_SWING:
-        below = int(np.searchsorted(table.omega, between[worst])) - 1
-        first, last = rad_s_to_hz(table.omega[below]), rad_s_to_hz(table.omega[below + 1])
-        raise InputError(
-            f'{path}: changes too abruptly for a smooth curve through its {len(table.omega)} '
-            f'frequencies: between {first:.6g} and {last:.6g} Hz the ground would give energy; '
-            'add frequencies there, or mend the jump')
+    return float(loss[worst]), int(np.searchsorted(table.omega, between[worst])) - 1
 
 
 def _units(stiffness: ComplexArray) -> FloatArray:

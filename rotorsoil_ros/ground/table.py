@@ -1,6 +1,7 @@
 """What a contact gives way by when somebody else computed or measured it."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,22 +31,35 @@ class ComplianceTable:
         Compliance of the massless contact over (x, y, z, rx, ry, rz) at these frequencies
         [m/N], [1/N], [rad/(N m)].
 
+    cut_offs : tuple of int
+        Rows, rising, at which waves of a layer begin to travel: no smooth curve leads over them.
+
     Notes
     -----
-    Cubic splines through real and imaginary parts; magnitude and phase are never interpolated.
+    Cubic splines through real and imaginary parts, from one cut-off to the next; magnitude and
+    phase are never interpolated.
 
     """
 
     omega: FloatArray
     values: ComplexArray
-    _spline: 'CubicSpline' = field(init=False, repr=False, compare=False)
+    cut_offs: tuple[int, ...] = ()
+    _splines: 'tuple[CubicSpline, ...]' = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         from scipy.interpolate import CubicSpline  # as slow to import as half of a start
 
         _require_frequencies(self.omega)
         _require_compliances(self.values, self.omega)
-        object.__setattr__(self, '_spline', CubicSpline(self.omega, self.values))
+        ends = (0, *self.cut_offs, len(self.omega) - 1)
+        object.__setattr__(self, '_splines', tuple(
+            CubicSpline(self.omega[left:right + 1], self.values[left:right + 1])
+            for left, right in pairwise(ends)))
+
+    @property
+    def singular(self) -> FloatArray:
+        """Frequencies of the cut-offs, rising [rad/s]."""
+        return self.omega[list(self.cut_offs)]
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """
@@ -73,7 +87,13 @@ class ComplianceTable:
             raise OutOfTableError(
                 f'frequency must be in [{self.omega[0]:g}, {self.omega[-1]:g}] rad/s, the range '
                 f'of the compliance table, got {omega[~inside][0]:g}')
-        values: ComplexArray = self._spline(omega)
+        if not self.cut_offs:
+            whole: ComplexArray = self._splines[0](omega)
+            return whole
+        values = np.empty((*omega.shape, 6, 6), dtype=complex)
+        piece = np.searchsorted(self.singular, omega, side='right')
+        for index, spline in enumerate(self._splines):
+            values[piece == index] = spline(omega[piece == index])
         return values
 
 

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+import rotorsoil_ros as rs
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model, response_key
 from rotorsoil_ros.case.stiffness_file import read
@@ -202,3 +203,35 @@ def test_file_of_bytes_is_told_in_one_line(tmp_path):
     (tmp_path / 's.csv').write_bytes(b'hz,\xff')
     with pytest.raises(InputError, match=r'is not a text file in UTF-8 \(byte 3\)$'):
         read(tmp_path / 's.csv', ANY)
+
+
+LOSSLESS = Path(__file__).parents[1] / 'cases' / 'layer_on_rock_lossless' / 'case.yaml'
+
+
+def test_layer_without_loss_is_cut_where_its_waves_begin():
+    [table] = load(LOSSLESS).tables
+    np.testing.assert_allclose(table.singular / (2.0 * np.pi), [7.5, 15.0])
+    between = np.linspace(0.5, 60.0, 1777) * 2.0 * np.pi
+    loss = np.linalg.eigvalsh(-table.compliance(between).imag)
+    assert loss.min() >= -1e-3 * np.abs(table.values).max()
+
+
+def test_modes_of_a_layer_without_loss_are_told(cache):
+    found = rs.load(LOSSLESS, cache_directory=cache).critical_speeds()
+    # The shaft on its block, far above both cut-offs, and light because little is radiated by it.
+    assert [one.speed_rpm for one in found if one.damping_ratio < 0.1] == pytest.approx(
+        [1482.0, 1573.0], rel=2e-3)
+
+
+def test_named_cut_offs_of_a_layer_with_loss_give_its_modes(cache):
+    keys = {'support.file': 'control_4_percent.csv', 'support.cut_offs_hz': [7.5, 15.0]}
+    machine = rs.load(LOSSLESS, cache_directory=cache, **keys)
+    np.testing.assert_allclose(machine.case.tables[0].singular / (2.0 * np.pi), [7.5, 15.0])
+    light = [one.speed_rpm for one in machine.critical_speeds() if one.damping_ratio < 0.1]
+    assert light == pytest.approx([1482.0, 1573.0], rel=5e-3)
+
+
+@pytest.mark.parametrize('places', [[0.5], [7.5, 8.0], [400.0]])
+def test_cut_offs_without_room_for_a_curve_are_refused(places):
+    with pytest.raises(InputError, match=r'layer0\.csv: cut_offs_hz must leave 4 rows'):
+        load(LOSSLESS, [f'support.cut_offs_hz={places}'])
