@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.bags.tables.imported import import_table, ImportedTable
     from rotorsoil_ros.case.design.report import DesignReport
     from rotorsoil_ros.case.design.variants import Study, study
+    from rotorsoil_ros.case.journal_entries import BearingStates
     from rotorsoil_ros.case.machine import load, Machine
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil, Soil, SoilModel
     from rotorsoil_ros.ground.table import ComplianceTable
     from rotorsoil_ros.machine.coupled import CoupledModel
+    from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter
     from rotorsoil_ros.machine.foundation import Foundation
     from rotorsoil_ros.machine.modes.campbell import Campbell
     from rotorsoil_ros.machine.modes.critical import CriticalSpeed
@@ -64,15 +66,16 @@ if TYPE_CHECKING:
 
 __version__ = '0.1.0'
 __all__ = [
-    'Bearing', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle', 'Comparison',
-    'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DesignReport', 'Disc',
-    'Embedment', 'Foundation', 'ImportedTable', 'InfiniteElementModel', 'InputError',
-    'JournalBearing', 'JournalStates', 'Layer', 'LayeredSoil', 'Machine', 'Matching', 'Material',
-    'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction',
-    'Predictor', 'Probe', 'Profile', 'Record', 'Rectangle', 'Response', 'ResponseTable',
-    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel',
-    'SoilSpread', 'SpeedSource', 'Study', 'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish',
-    'compare', 'export_log', 'import_table', 'load', 'predict_many', 'read_profile', 'study',
+    'Bearing', 'BearingStates', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle',
+    'Comparison', 'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DampingSplit',
+    'DampingSplitter', 'DesignReport', 'Disc', 'Embedment', 'Foundation', 'ImportedTable',
+    'InfiniteElementModel', 'InputError', 'JournalBearing', 'JournalStates', 'Layer',
+    'LayeredSoil', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'Oil', 'OutOfTableError',
+    'Part', 'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Record',
+    'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
+    'ShaftSection', 'Site', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource', 'Study',
+    'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log', 'import_table',
+    'load', 'predict_many', 'read_profile', 'study',
 ]
 
 # Which room a public name lives in.
@@ -84,6 +87,7 @@ _ROOMS = {
     'bags.tables.imported': ('ImportedTable', 'import_table'),
     'case.design.report': ('DesignReport',),
     'case.design.variants': ('Study', 'study'),
+    'case.journal_entries': ('BearingStates',),
     'case.machine': ('Machine', 'load'),
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
@@ -98,6 +102,7 @@ _ROOMS = {
     'ground.soil': ('Circle', 'Rectangle', 'RigidSoil', 'Soil', 'SoilModel'),
     'ground.table': ('ComplianceTable',),
     'machine.coupled': ('CoupledModel',),
+    'machine.damping': ('DampingSplit', 'DampingSplitter'),
     'machine.foundation': ('Foundation',),
     'machine.modes.campbell': ('Campbell',),
     'machine.modes.critical': ('CriticalSpeed',),
