@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorsoil_ros.case import config, models
 from rotorsoil_ros.case.cache import Cache
+from rotorsoil_ros.case.design.tables import infinite_element_model
 from rotorsoil_ros.ground.soil import Soil
 
 CASE = Path(__file__).parents[1] / 'config' / 'plant_fan.yaml'
@@ -52,7 +53,7 @@ def true(case, model, speed, directory):
                                                           - 1.0)
         one = Soil(soil.shear_modulus * spread.shear_modulus_factor ** random.uniform(-1.0, 1.0),
                    round(nu, 4), soil.density, soil.loss_factor)
-        ground = tuple(models.infinite_element_model(
+        ground = tuple(infinite_element_model(
             one, block.contact, 'disc', cache=Cache(directory), speed_range=(low, high))
             for block in model.foundations)
         truth = replace(model, soil_models=ground)

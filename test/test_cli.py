@@ -262,7 +262,8 @@ def test_machine_that_does_not_move_is_drawn_all_the_same(tmp_path, capsys):
     assert main(['plot', PAPER, '--set', 'unbalances=[]', '--set', 'soil.poisson_ratio=0.495',
                  '-o', str(tmp_path), '--cache', str(tmp_path / 'cache')]) == 0
     # infinite elements refuse that soil: what is not drawn is told
-    assert capsys.readouterr().err.startswith('no picture compliance_block: poisson_ratio')
+    assert capsys.readouterr().err.startswith(
+        'infinite elements are not in picture compliance_block: poisson_ratio')
     assert (tmp_path / 'bode_discs.png').exists()
 
 

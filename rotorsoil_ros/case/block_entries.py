@@ -5,8 +5,10 @@ import math
 
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.accuracy import gap
+from rotorsoil_ros.ground.plan import Part, Plan
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
 from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
 
@@ -43,13 +45,15 @@ class BlockEntries:
         """Raise an InputError at the second of two blocks that stand on the same ground."""
         for second, block in enumerate(foundations):
             for first, other in enumerate(foundations[:second]):
-                apart = abs(block.centre_y - other.centre_y)
-                clear = gap(block.contact, other.contact, distance=apart)
-                if clear < -_ROUND_OFF * apart:
+                x, y = (abs(block.centre_x - other.centre_x), abs(block.centre_y - other.centre_y))
+                clear = gap(block.contact, other.contact, apart=(
+                    other.centre_x - block.centre_x, other.centre_y - block.centre_y))
+                if clear < -_ROUND_OFF * max(x, y):
+                    where = f'{y:.4g} m' if x == 0.0 else f'{x:.4g} m across and {y:.4g} m along'
                     raise self.faults.error(
                         'foundations', second, problem=f'{block.name} must not overlap '
-                        f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap along '
-                        f'y: centres are {apart:.4g} m apart')
+                        f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap'
+                        f'{" along y" if x == 0.0 else ""}: centres are {where} apart')
 
     def _foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
         blocks = self.faults.entries.foundations
@@ -59,17 +63,26 @@ class BlockEntries:
         seats = [bearing.position for bearing in bearings if bearing.foundation in own]
         if not seats and self._is_undecided:
             seats = [0.0]  # never used: which bearing has to choose has been kept
-        if not seats:
-            raise self.faults.error('foundations', index, problem=f'no bearing stands on '
-                                                            f'{entry.name}')
+        coupled = self.faults.entries.support.model == BOUNDARY_ELEMENTS
+        if not seats and not (coupled and entry.centre_y is not None):
+            raise self.faults.error('foundations', index, problem=(
+                f'no bearing stands on {entry.name}' + ('; a block beside the machine needs '
+                                                        'centre_y in m' if coupled else '')))
         with self.faults.at('foundations', index, entry=entry):
             contact = self._contact(index, entry)
             mass, centre, inertia = self._body(index, entry, contact)
-            centre_y = entry.centre_y
+            along = entry.centre_y
+            if along is None:
+                along = 0.5 * (min(seats) + max(seats))
+            # A plan turns about its centroid; its parts are placed about the keys' centre.
+            x, y = contact.centroid if isinstance(contact, Plan) else (0.0, 0.0)
+            product = 0.0
+            if isinstance(contact, Plan) and entry.inertia is None:
+                product = mass * contact.product_moment / contact.area
             return Foundation(
-                name=entry.name, contact=contact, mass=mass,
-                centre_y=0.5 * (min(seats) + max(seats)) if centre_y is None else centre_y,
-                centre_of_gravity_height=centre, inertia=inertia, height=entry.height)
+                name=entry.name, contact=contact, mass=mass, centre_x=entry.centre_x + x,
+                centre_y=along + y, centre_of_gravity_height=centre, inertia=inertia,
+                height=entry.height, inertia_product=product)
 
     def _body(
         self, index: int, entry: schema.FoundationEntry, contact: Contact,
@@ -99,9 +112,24 @@ class BlockEntries:
 
     def _contact(self, index: int, entry: schema.FoundationEntry) -> Contact:
         width, length, radius = entry.half_width, entry.half_length, entry.radius
+        if entry.parts is not None:
+            given = next((key for key, value in (
+                ('half_width', width), ('half_length', length), ('radius', radius))
+                if value is not None), None)
+            if given is not None:
+                raise self.faults.error('foundations', index, 'parts', problem=(
+                    f'takes the place of half_width, half_length and radius, got {given} too'))
+            return Plan(self._parts(index, entry.parts))
         if radius is not None and width is None and length is None:
             return Circle(radius)
         if radius is None and width is not None and length is not None:
             return Rectangle(width, length)
-        raise self.faults.error('foundations', index, problem='needs either half_width and '
-                                                              'half_length or radius, in m')
+        raise self.faults.error('foundations', index, problem=(
+            'needs either half_width and half_length, or parts, or radius, in m'))
+
+    def _parts(self, index: int, entries: list[schema.PartEntry]) -> tuple[Part, ...]:
+        def part(number: int, entry: schema.PartEntry) -> Part:
+            with self.faults.at('foundations', index, 'parts', number, entry=entry):
+                return Part(entry.half_width, entry.half_length, *entry.centre)
+
+        return tuple(part(number, entry) for number, entry in enumerate(entries))

@@ -104,9 +104,10 @@ class Faults:
         rotor = self.entries.rotor
         groups: list[tuple[Place, Sequence[
             schema.FoundationEntry | schema.DiscEntry | BearingEntry
-            | schema.ProbeEntry]]] = [
+            | schema.ProbeEntry | schema.GroundProbeEntry]]] = [
             (('foundations',), self.entries.foundations), (('rotor', 'discs'), rotor.discs),
-            (('rotor', 'bearings'), rotor.bearings), (('rotor', 'probes'), rotor.probes)]
+            (('rotor', 'bearings'), rotor.bearings), (('rotor', 'probes'), rotor.probes),
+            (('ground', 'probes'), self.entries.ground.probes)]
         return [((*group, index), entry.name) for group, entries in groups
                 for index, entry in enumerate(entries)]
 

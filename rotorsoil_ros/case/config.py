@@ -15,6 +15,7 @@ from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, message
 from rotorsoil_ros.case.entries.entry import faults
 from rotorsoil_ros.case.entries.ground import GroundEntries, THIN_LAYERS
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, GroundProbe, SiteEntries
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
@@ -64,6 +65,8 @@ class Case:
         Where the support knows layers and embedment, or the file tells them.
     embedments : tuple of Embedment
         How deep each block stands in the ground, and how much of its wall is welded.
+    ground_probes : tuple of GroundProbe
+        Places on the ground whose motion is wanted.
     tables : tuple of ComplianceTable
         What each block stands on where a file says it; else empty.
     uncertainty : SoilSpread
@@ -96,6 +99,7 @@ class Case:
     speed_range: tuple[float, float]
     ground: LayeredSoil | None = None
     embedments: tuple[Embedment, ...] = ()
+    ground_probes: tuple[GroundProbe, ...] = ()
     tables: tuple[ComplianceTable, ...] = ()
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
@@ -243,6 +247,7 @@ class _Builder:
         if rotor is not None:
             faults.attempt(lambda: self._refuse_bursting_speed(rotor))
         foundations, embedments = BlockEntries(faults).foundations(), on.embedments(ground)
+        probes = faults.attempt(SiteEntries(faults).probes)
         unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
         unbalance = unbalances.total()
         tables = None if speed_range is None else faults.attempt(
@@ -256,6 +261,7 @@ class _Builder:
         assert rotor is not None
         assert foundations is not None
         assert embedments is not None
+        assert probes is not None
         assert unbalance is not None
         assert speed_range is not None
         assert tables is not None
@@ -270,7 +276,7 @@ class _Builder:
             name=entries.name, path=faults.path, soil=soil, ground=layered,
             embedments=embedments, support=entries.support, foundations=foundations,
             rotor=floated(rotor, journals), unbalance=unbalance, couples=unbalances.couples(),
-            speed_range=speed_range, tables=tables,
+            speed_range=speed_range, ground_probes=probes, tables=tables,
             uncertainty=uncertainty, zones=zones, anti_alias=self.faults.entries.anti_alias,
             journals=journals, oil_temperatures=oils, cache_directory=self.cache_directory,
             content=self.content, files=self.files)
@@ -353,6 +359,9 @@ class _Builder:
                 with self.faults.at('foundations', index):
                     proportions(case.ground, foundation.contact, case.embedments[index],
                                 case.speed_range)
+        if case.support.model == BOUNDARY_ELEMENTS and case.soil is not None:
+            SiteEntries(self.faults).refuse_unreachable(
+                case.foundations, case.ground_probes, case.soil, case.speed_range)
         if case.support.model != 'infinite_elements' or case.soil is None:
             return
         geometry = case.support.geometry

@@ -8,7 +8,9 @@ from pathlib import Path
 from rotorsoil_ros.background import Child, Children, run_as_child
 from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.case.cache import Cache
+from rotorsoil_ros.case.design import tables
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of, site_reach
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.half_space import a0_range
@@ -47,16 +49,20 @@ def soil_keys(case: config.Case) -> list[str]:
     """Return what identifies the tables of the ground that a case needs."""
     geometry, soil = case.support.geometry, case.soil
     if case.support.model == THIN_LAYERS and case.ground is not None:
-        return [models.layers_key(config.proportions(
+        return [tables.layers_key(config.proportions(
             case.ground, block.contact, embedment, case.speed_range))
             for block, embedment in zip(case.foundations, case.embedments, strict=True)]
+    if case.support.model == BOUNDARY_ELEMENTS and soil is not None:
+        site = site_of(case.foundations, case.ground_probes)
+        return [tables.site_key(site.scaled(), soil.poisson_ratio, soil.loss_factor,
+                                site_reach(site, soil, case.speed_range))]
     if case.support.model != 'infinite_elements' or soil is None:
         return []
     keys = []
     for foundation in case.foundations:
         low, high = config.infinite_range(soil, foundation.contact, geometry, case.speed_range)
         covered = a0_range(soil, foundation.contact, geometry, omega_min=low, omega_max=high)
-        keys.append(models.compliance_key(soil, geometry, *covered))
+        keys.append(tables.compliance_key(soil, geometry, *covered))
     return keys
 
 

@@ -1,6 +1,7 @@
 """The models that a case stands for, with their tables out of the cache."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
@@ -12,20 +13,28 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
-from rotorsoil_ros.case.config import Case, infinite_range, proportions
+from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.ground import band_contents
+from rotorsoil_ros.case.design.tables import (
+    boundary_element_model,
+    infinite_element_model,
+    key_of,
+    thin_layer_model,
+)
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.summary import stability_doubts, unstable
 from rotorsoil_ros.errors import InputError, RotorSoilError, solved
-from rotorsoil_ros.ground.accuracy import mapping_error
+from rotorsoil_ros.ground.accuracy import shape_error, ShapeError
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.elements.table import DimensionlessTable, require_kind
-from rotorsoil_ros.ground.half_space import a0_range, ELEMENTS_ALGORITHM, InfiniteElementModel
-from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
-from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil, LEAST_LOSS_FACTOR
-from rotorsoil_ros.ground.layers.table import LayeredTable
+from rotorsoil_ros.ground.elements.table import require_kind
+from rotorsoil_ros.ground.half_space import InfiniteElementModel
+from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import LEAST_LOSS_FACTOR
 from rotorsoil_ros.ground.neighbours import on_soil
-from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel
+from rotorsoil_ros.ground.soil import Circle, Contact, RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.band import (
     depends_on_soil,
@@ -47,8 +56,14 @@ UNITS = {
     'convention': 'x(t) = Re(X exp(+i omega t))',
 }
 
-# Rectangles that are longer than any that was measured are taken to be off by this.
-_LARGEST_MAPPING = 0.5
+# Frequencies at which a model is compared with what knows its shape, and the lowest of them over
+# the highest where a machine starts from rest.
+_COMPARED = 60
+_LOWEST_SHARE = 0.02
+
+# Shapes on layers are taken to be stiffer than their discs by no more than this, and by this where
+# nobody knows.
+_MOST_STIFFER = 0.5
 
 
 def coupled_model(case: Case, directory: Path) -> CoupledModel:
@@ -70,11 +85,16 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
     """
     with solved('the ground under this machine'):
         soils = soil_models(case, directory)
-    return CoupledModel(case.rotor, case.foundations, soils, case.couples)
+    return CoupledModel(case.rotor, case.foundations, soils, case.couples,
+                        tuple(probe.name for probe in case.ground_probes))
 
 
 def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:
-    """Return the model of the soil under each foundation, as `coupled_model`."""
+    """Return the model under each foundation, or one under all of them, as `coupled_model`."""
+    if case.support.model == BOUNDARY_ELEMENTS and case.soil is not None:
+        site = site_of(case.foundations, case.ground_probes)
+        return (boundary_element_model(case.soil, site, cache=Cache(directory),
+                                       speed_range=case.speed_range),)
     return tuple(_soil_model(case, index, Cache(directory))
                  for index in range(len(case.foundations)))
 
@@ -96,83 +116,50 @@ def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
                                   speed_range=case.speed_range)
 
 
-def infinite_element_model(
-    soil: Soil, contact: Contact, geometry: str, *, cache: Cache,
-    speed_range: tuple[float, float],
-) -> InfiniteElementModel:
+def shape_errors(
+    case: Case, soil_models: Sequence[SoilModel], directory: Path,
+) -> tuple[ShapeError | None, ...]:
     """
-    Return infinite elements for a soil, solved unless a soil of its kind was before.
+    Return how far discs and cones are from the shape of each block over the speed range.
 
-    Parameters
-    ----------
-    soil, contact, geometry
-        As `InfiniteElementModel.solved`.
-    cache : Cache
-        Where dimensionless tables lie.
-    speed_range : tuple of two floats
-        Rotor speeds to be covered [rad/s].
-
+    Against boundary elements of that block alone; a circle on cones against infinite elements.
+    On layers, discs and block are compared on a half-space of the soil below the base. None where
+    the model is exact, or the shape is beyond reach.
     """
-    low, high = infinite_range(soil, contact, geometry, speed_range)
-    key = compliance_key(
-        soil, geometry, *a0_range(soil, contact, geometry, omega_min=low, omega_max=high))
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return InfiniteElementModel(soil, contact, DimensionlessTable.from_arrays(stored))
-    model = InfiniteElementModel.solved(soil, contact, geometry, omega_min=low, omega_max=high)
-    cache.store('compliance', key, model.table.to_arrays())
-    return model
+    support, soil = case.support, case.soil
+    if (soil is None or support.geometry != 'disc'
+            or support.model not in ('cone', 'infinite_elements', THIN_LAYERS)):
+        return (None,) * len(case.foundations)
+    cache, low, high = Cache(directory), *case.speed_range
+    omega = np.linspace(max(low, _LOWEST_SHARE * high), high, _COMPARED)
 
+    def error(contact: Contact, model: SoilModel, alone: Site | None) -> ShapeError | None:
+        is_round = alone is None
+        if is_round and support.model != 'cone':
+            return None
+        with suppress(RotorSoilError):
+            disc: SoilModel = model
+            if is_round or support.model == THIN_LAYERS:
+                require_kind('disc', soil.poisson_ratio, soil.loss_factor)
+                disc = infinite_element_model(soil, contact, 'disc', cache=cache,
+                                              speed_range=case.speed_range)
+            if alone is None:
+                return shape_error(model, disc, omega)
+            return shape_error(disc, boundary_element_model(
+                soil, alone, cache=cache, speed_range=case.speed_range), omega)
+        return None
 
-def thin_layer_model(
-    ground: LayeredSoil, contact: Contact, embedment: Embedment, *, cache: Cache,
-    speed_range: tuple[float, float],
-) -> ThinLayerModel:
-    """
-    Return thin layers, solved unless a ground of these proportions was before.
-
-    Parameters
-    ----------
-    ground, contact, embedment
-        As `ThinLayerModel.solved`.
-    cache : Cache
-        Where dimensionless tables lie.
-    speed_range : tuple of two floats
-        Rotor speeds to be covered [rad/s].
-
-    """
-    scaled = proportions(ground, contact, embedment, speed_range)
-    key = layers_key(scaled)
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return ThinLayerModel(ground, contact, LayeredTable.from_arrays(stored), embedment)
-    table = scaled.table()
-    cache.store('compliance', key, table.to_arrays())
-    return ThinLayerModel(ground, contact, table, embedment)
-
-
-def layers_key(scaled: Proportions) -> str:
-    """Return what identifies a table of layered ground: ratios of stiffness, density and size."""
-    return content_key('layers', LAYERS_ALGORITHM, scaled)
-
-
-def compliance_key(soil: Soil, geometry: str, a0_min: float, a0_max: float) -> str:
-    """Return what identifies a dimensionless table: neither G, nor density, nor size."""
-    return content_key('compliance', ELEMENTS_ALGORITHM, geometry, soil.poisson_ratio,
-                       soil.loss_factor, a0_min, a0_max)
+    return tuple(
+        error(block.contact, model,
+              None if isinstance(block.contact, Circle) else site_of([block]))
+        for block, model in zip(case.foundations, soil_models, strict=True))
 
 
 def response_key(case: Case, model: CoupledModel) -> str:
     """Return what identifies the response table of a case: all of it but its unbalance."""
     return content_key('response', TOLERANCE, model.rotor, model.foundations,
                        [_identity(soil) for soil in model.soil_models], case.speed_range,
-                       model.couples)
-
-
-def key_of(model: InfiniteElementModel) -> str:
-    """Return what identifies the dimensionless table of a model."""
-    table = model.table
-    return compliance_key(model.soil, table.geometry, table.a0_min, table.a0_max)
+                       model.couples, model.points)
 
 
 def _identity(model: SoilModel) -> object:
@@ -181,6 +168,8 @@ def _identity(model: SoilModel) -> object:
     if isinstance(model, ThinLayerModel):
         return ['layers', LAYERS_ALGORITHM, model.ground, model.contact, model.embedment,
                 float(model.table.edges[-1])]
+    if isinstance(model, BoundaryElementModel):
+        return ['boundary', model.soil, model.site, key_of(model)]
     if isinstance(model, ComplianceTable):
         return ['table', model.omega, model.values, *model.cut_offs]
     return model
@@ -320,20 +309,34 @@ def _other_forms(
     if (not spread.model_form or case.soil is None or case.support.geometry != 'disc'
             or case.support.model not in ('cone', 'infinite_elements', THIN_LAYERS)):
         return [], stiffer
-    stiffer = [min(mapping_error(block.contact), _LARGEST_MAPPING) for block in case.foundations]
-    if case.support.model != 'cone':
-        return [], stiffer
+    if case.support.model == THIN_LAYERS:
+        # On layers only discs are known: how much stiffer a shape is than they, a half-space tells.
+        shapes = shape_errors(case, [RigidSoil()] * len(stiffer), directory)
+        return [], [0.0 if isinstance(block.contact, Circle) else
+                    min(_MOST_STIFFER if shape is None else shape.share, _MOST_STIFFER)
+                    for block, shape in zip(case.foundations, shapes, strict=True)]
     low, high = case.speed_range
     # A softer soil has shorter waves: its table has to reach further.
-    reach = max(1.0, 0.5 * spread.shear_modulus_factor**0.5)
-    try:
-        require_kind('disc', case.soil.poisson_ratio, case.soil.loss_factor)
-        elements: list[SoilModel] = [infinite_element_model(
-            case.soil, block.contact, 'disc', cache=Cache(directory),
-            speed_range=(low, reach * high)) for block in case.foundations]
-    except RotorSoilError:  # beyond the reach of infinite elements: `band_contents` says so
-        return [], stiffer
-    return elements, stiffer
+    speeds = low, max(1.0, 0.5 * spread.shear_modulus_factor**0.5) * high
+    cache = Cache(directory)
+    # Beyond the reach of either there is no other form: `band_contents` says so.
+    with suppress(RotorSoilError):
+        if not any(isinstance(block.contact, Circle) for block in case.foundations):
+            return [boundary_element_model(
+                case.soil, site_of(case.foundations), cache=cache, speed_range=speeds,
+                spread=spread.poisson_ratio)], stiffer
+        if case.support.model == 'cone':
+            require_kind('disc', case.soil.poisson_ratio, case.soil.loss_factor)
+            return [infinite_element_model(case.soil, block.contact, 'disc', cache=cache,
+                                           speed_range=speeds)
+                    for block in case.foundations], stiffer
+    return [], stiffer
+
+
+def blocks_on_each(model: CoupledModel) -> list[str]:
+    """Return which block stands on each model of the soil, or which blocks on the only one."""
+    names = [block.name for block in model.foundations]
+    return [' and '.join(names)] if len(model.soil_models) == 1 else names
 
 
 def description(
@@ -341,9 +344,9 @@ def description(
 ) -> dict[str, object]:
     """Return what predictions under a name and an unbalance, (p,), rest on."""
     stable = table.stability
-    compliances = {f'compliance of {foundation.name}': key_of(soil) for foundation, soil in zip(
-        model.foundations, model.soil_models, strict=True)
-        if isinstance(soil, InfiniteElementModel)}
+    compliances = {f'compliance of {names}': key_of(soil) for names, soil in zip(
+        blocks_on_each(model), model.soil_models, strict=True)
+        if isinstance(soil, (BoundaryElementModel, InfiniteElementModel))}
     return {
         'machine': name, 'case': case.name, 'version': rotorsoil_ros.__version__,
         'support': case.support.model, 'tables': {'response': table.key, **compliances},

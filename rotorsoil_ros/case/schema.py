@@ -71,19 +71,30 @@ AnySoil: TypeAlias = Annotated[
 class SupportEntry(Entry):
     """Which model of the soil stands below the blocks."""
 
-    model: Literal['rigid', 'cone', 'infinite_elements', 'thin_layers', 'table']
+    model: Literal['rigid', 'cone', 'infinite_elements', 'boundary_elements', 'thin_layers',
+                   'table']
     geometry: Literal['disc', 'plane_strain', 'plane_stress'] = 'disc'
     file: FileName | None = None
     cut_offs_hz: list[Hertz] | None = None
 
 
+class PartEntry(Entry):
+    """Rectangle of a plan, its centre across and along the shaft."""
+
+    half_width: Metre
+    half_length: Metre
+    centre: tuple[Metre, Metre]
+
+
 class FoundationEntry(Entry):
-    """Block; its contact is a rectangle or a circle."""
+    """Block; its contact is a rectangle, a circle or a plan of several rectangles."""
 
     name: Name
     half_width: Metre | None = None
     half_length: Metre | None = None
     radius: Metre | None = None
+    parts: list[PartEntry] | None = None
+    centre_x: Metre = 0.0
     centre_y: Metre | None = None
     mass: Kilogram | None = None
     centre_of_gravity_height: Metre | None = None
@@ -155,6 +166,26 @@ class RotorEntry(Entry):
     probes: list[ProbeEntry] = Field(default_factory=list)
 
 
+class PlaceEntry(Entry):
+    """Place on the ground: across the shaft from its plane, and along it."""
+
+    x: Metre
+    y: Metre
+
+
+class GroundProbeEntry(Entry):
+    """Place on the ground whose motion is wanted."""
+
+    name: Name
+    place: PlaceEntry
+
+
+class GroundEntry(Entry):
+    """What is asked of the ground beside the blocks."""
+
+    probes: list[GroundProbeEntry] = Field(default_factory=list)
+
+
 class UnbalanceEntry(Entry):
     """Unbalance on one disc: a moment, or what a balance grade permits, and a couple."""
 
@@ -213,6 +244,7 @@ class Document(Entry):
     soil: AnySoil | None = None
     support: SupportEntry
     foundations: list[FoundationEntry] = Field(default_factory=list)
+    ground: GroundEntry = Field(default_factory=GroundEntry)
     rotor: RotorEntry
     unbalances: list[UnbalanceEntry] = Field(default_factory=list)
     speed_range_rpm: tuple[Rpm, Rpm]

@@ -2,24 +2,32 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+import itertools
 import math
 
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.design.ground import band_contents, layers_told, model_error
+from rotorsoil_ros.case.design.ground import (
+    band_contents,
+    layers_told,
+    model_error,
+    of_neighbours,
+    of_site,
+)
 from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
-from rotorsoil_ros.ground.accuracy import (
-    gap,
-    mapping_error,
-    neglected_coupling,
-    side_ratio,
+from rotorsoil_ros.ground.accuracy import ShapeError
+from rotorsoil_ros.ground.soil import (
+    below_each,
+    equivalent_radii,
+    singular_of,
+    Soil,
+    SoilModel,
 )
-from rotorsoil_ros.ground.soil import equivalent_radii, singular_of, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.rotor.bearing import SpeedTable
@@ -30,7 +38,6 @@ from rotorsoil_ros.units import GRAVITY, rad_s_to_hz, rad_s_to_rpm
 _SMALLEST_A0 = 1.5
 _LARGEST_A0 = 6.0
 _LARGEST_A0_INCOMPRESSIBLE = 2.0
-_LARGEST_ASPECT = 2.0
 _LARGEST_POISSON_RATIO = 0.45
 
 # A film: load over length times diameter [Pa], Reynolds numbers above which it has vortices (times
@@ -45,9 +52,21 @@ _SURVIVED = 0.05
 
 
 def derived_quantities(
-    case: Case, soil_models: Sequence[SoilModel],
+    case: Case, soil_models: Sequence[SoilModel], shapes: Sequence[ShapeError | None] = (),
 ) -> Iterator[tuple[str, str]]:
-    """Yield names and values, with units, of what follows from a case and its soil."""
+    """
+    Yield names and values, with units, of what follows from a case and its soil.
+
+    Parameters
+    ----------
+    case : Case
+        The machine.
+    soil_models : sequence of SoilModel
+        Below each block, or one below all.
+    shapes : sequence of ShapeError or None
+        How far the model of each block is from its shape, where somebody has measured it.
+
+    """
     low, high = case.speed_range
     yield 'case', f'{case.name} ({case.path})'
     yield 'speed range', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm'
@@ -62,11 +81,13 @@ def derived_quantities(
         yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
         yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
     yield from layers_told(case)
-    for foundation, model in zip(case.foundations, soil_models, strict=True):
+    below = below_each(soil_models, len(case.foundations))
+    for foundation, model, shape in itertools.zip_longest(case.foundations, below, shapes):
         yield from _of_foundation(case, foundation, model)
-        told = model_error(case, foundation)
+        told = model_error(case, foundation, shape)
         if told:
             yield f'{foundation.name}: model error', told
+    yield from of_site(case, soil_models)
     for journal in case.journals:
         yield from _of_journal(case, journal)
     if band_contents(case):
@@ -134,20 +155,6 @@ def _of_journal(case: Case, journal: Journal) -> Iterator[tuple[str, str]]:
             '(textbook)')
 
 
-def _of_neighbours(case: Case) -> Iterator[str]:
-    """Yield which blocks are coupled through a soil that takes each as alone."""
-    if case.support.model == 'rigid':
-        return
-    for second, block in enumerate(case.foundations):
-        for other in case.foundations[:second]:
-            apart = abs(block.centre_y - other.centre_y)
-            coupling, change = neglected_coupling(block.contact, other.contact, distance=apart)
-            clear = gap(block.contact, other.contact, distance=apart)
-            yield (f'{block.name}: stands {max(clear, 0.0):.3g} m beside {other.name}; each is '
-                   'taken as alone on the ground: a load on one moves the other by up to '
-                   f'{coupling:.0%} of its own motion, and its own changes by up to {change:.0%}')
-
-
 def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
     """Return the dimensionless frequency of a block, omega b / c_s or omega r0 / c_s."""
     return omega * foundation.contact.characteristic_length / soil.shear_wave_speed
@@ -165,7 +172,7 @@ def warnings(case: Case) -> Iterator[str]:
     yield from _of_bearings(case)
     for journal in case.journals:
         yield from _of_film(case, journal)
-    yield from _of_neighbours(case)
+    yield from of_neighbours(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):
@@ -316,11 +323,6 @@ def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:
     if case.support.geometry != 'disc':
         yield (f'{foundation.name}: a strip radiates more than a block of finite length and '
                'holds y, rx and rz; geometry disc is the three-dimensional one')
-    elif side_ratio(foundation.contact) > _LARGEST_ASPECT:
-        share = mapping_error(foundation.contact)
-        off = f'up to {share:.0%}' if share < math.inf else 'more than 37%'
-        yield (f'{foundation.name}: contact is {side_ratio(foundation.contact):.3g} times as long '
-               f'as wide; discs of equal area, which stand for it, are off by {off}')
 
 
 def _of_cones(

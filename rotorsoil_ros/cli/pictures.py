@@ -12,6 +12,8 @@ import numpy as np
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.design.tables import boundary_element_model, infinite_element_model
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
@@ -22,11 +24,16 @@ from rotorsoil_ros.figures.damping import damping_figure
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
 
 if TYPE_CHECKING:
     from rotorsoil_ros.figures import Figure
+
+_POINTS = 241  # of a compliance over frequency
 
 
 def plot(arguments: Namespace) -> int:
@@ -69,19 +76,52 @@ def _studies(
 def _soil_figures(
     case: Case, model: CoupledModel, directory: Path,
 ) -> Iterator[tuple[str, 'Figure']]:
-    """Yield both models of the soil below each block, where the case has a soil."""
-    if case.soil is None or case.support.model not in ('cone', 'infinite_elements'):
+    """Yield all models of the soil below each block, where the case has a soil."""
+    if case.soil is None or case.support.model not in (
+            'cone', 'infinite_elements', BOUNDARY_ELEMENTS):
         return
-    for block in model.foundations:
-        try:
-            infinite = models.infinite_element_model(
-                case.soil, block.contact, case.support.geometry, cache=cache.Cache(directory),
-                speed_range=case.speed_range)
-        except RotorSoilError as error:
-            # Cones know soils that infinite elements refuse.
-            print(f'no picture compliance_{block.name}: {error}', file=sys.stderr)
-            continue
-        yield f'compliance_{block.name}', compliance_figure(case.name, block, infinite)
+    for index, block in enumerate(model.foundations):
+        known: dict[str, SoilModel] = {'cone': ConeModel(case.soil, block.contact)}
+        spans = []
+        for label, solved in (('infinite elements', _infinite), ('boundary elements', _boundary)):
+            try:
+                known[label], span = solved(case, model, index, cache.Cache(directory))
+            except RotorSoilError as error:
+                # Cones know soils and shapes that others refuse.
+                print(f'{label} are not in picture compliance_{block.name}: {error}',
+                      file=sys.stderr)
+            else:
+                spans.append(span)
+        if spans:
+            omega = np.linspace(max(span[0] for span in spans), min(span[1] for span in spans),
+                                _POINTS)
+            yield f'compliance_{block.name}', compliance_figure(
+                case.name, block, case.soil, known, omega)
+
+
+def _infinite(
+    case: Case, model: CoupledModel, index: int, tables: cache.Cache,
+) -> tuple[SoilModel, tuple[float, float]]:
+    assert case.soil is not None
+    found = infinite_element_model(
+        case.soil, model.foundations[index].contact, case.support.geometry, cache=tables,
+        speed_range=case.speed_range)
+    return found, found.omega_range
+
+
+def _boundary(
+    case: Case, model: CoupledModel, index: int, tables: cache.Cache,
+) -> tuple[SoilModel, tuple[float, float]]:
+    assert case.soil is not None
+    if case.support.geometry != 'disc':
+        raise RotorSoilError('they are three-dimensional, a strip is not')
+    ground = model.soil_models[0]
+    if isinstance(ground, BoundaryElementModel):
+        return model.support.soils[index], ground.omega_range
+    found = boundary_element_model(
+        case.soil, site_of([model.foundations[index]]), cache=tables,
+        speed_range=case.speed_range)
+    return found, found.omega_range
 
 
 def figures(arguments: Namespace) -> int:

@@ -13,6 +13,7 @@ from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.design.depth import depth_remarks
 from rotorsoil_ros.case.design.ground import model_error
 from rotorsoil_ros.case.design.report import Acceptance
+from rotorsoil_ros.case.design.tables import key_of
 from rotorsoil_ros.case.journal_entries import BEYOND
 from rotorsoil_ros.case.summary import (
     clipped,
@@ -28,6 +29,7 @@ from rotorsoil_ros.cli.arguments.options import SI
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -60,7 +62,8 @@ def check(arguments: Namespace) -> int:
         if case.journals:
             doubts += near_threshold(case, stability(
                 model, (case.speed_range[0], BEYOND * case.speed_range[1])))
-    _print_table(derived_quantities(case, model.soil_models))
+    shapes = models.shape_errors(case, model.support.soils, directory)
+    _print_table(derived_quantities(case, model.soil_models, shapes))
     _print_table(_stability(table.stability, units))
     _print_table(criticals)
     peaks = _peaks(case, table)
@@ -109,10 +112,13 @@ def tabulate(arguments: Namespace) -> int:
         with progress('solving') as _:
             table = models.response_table(case, model, directory)
     seconds = time.perf_counter() - start
-    for foundation, soil in zip(model.foundations, model.soil_models, strict=True):
-        _print_table(_compliance(foundation.name, soil, directory))
+    for names, soil in zip(models.blocks_on_each(model), model.soil_models, strict=True):
+        _print_table(_compliance(names, soil, directory))
     if model.foundations:
         print(f'{"soil ready in":40s} {soil_seconds:.3g} s')
+    errors = [(block, model_error(case, block, shape)) for block, shape in zip(
+        case.foundations, models.shape_errors(case, model.support.soils, directory),
+        strict=True)]
     low, high = table.speed_range
     _print_table([
         ('response table', f'{how} in {seconds:.3g} s'),
@@ -121,8 +127,7 @@ def tabulate(arguments: Namespace) -> int:
         ('pieces', f'{len(table.pieces.resolved)} polynomials'),
         ('largest error of the solver', f'{table.accuracy:.2g} of the local amplitude, at unseen '
                                         'speeds; that of the models is another'),
-        *((f'{block.name}: model error', model_error(case, block)) for block in case.foundations
-          if model_error(case, block)),
+        *((f'{block.name}: model error', told) for block, told in errors if told),
         *(('unstable', f'{rad_s_to_rpm(left):.10g} to {rad_s_to_rpm(right):.10g} rpm: no steady '
                        'response') for left, right in table.stability.unstable.tolist()),
         *(('gap', f'{rad_s_to_rpm(left):.10g} to {rad_s_to_rpm(right):.10g} rpm: resonance '
@@ -133,6 +138,9 @@ def tabulate(arguments: Namespace) -> int:
 
 
 def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[str, str]]:
+    if isinstance(soil, BoundaryElementModel):
+        yield from _boundary(block, soil, directory)
+        return
     if not isinstance(soil, InfiniteElementModel):
         yield f'{block}: compliance', f'closed form, {type(soil).__name__}'
         return
@@ -145,7 +153,21 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
     yield f'{block}: solves', f'{table.solves} of {table.unknowns} unknowns'
     yield (f'{block}: largest error of the solver',
            f'{table.measured_error:.2g}, at unseen frequencies')
-    yield f'{block}: file', str(cache.Cache(directory).path('compliance', models.key_of(soil)))
+    yield f'{block}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
+
+
+def _boundary(
+    blocks: str, soil: BoundaryElementModel, directory: Path,
+) -> Iterable[tuple[str, str]]:
+    table = soil.tables[0]
+    yield f'{blocks}: compliance', (f'boundary elements, nu {table.poisson_ratio:g}, eta '
+                                    f'{table.loss_factor:g}')
+    yield f'{blocks}: covers', (f'a0 0 to {table.a0_max:g}, here 0 to '
+                                f'{rad_s_to_hz(soil.omega_range[1]):.4g} Hz')
+    yield f'{blocks}: solves', f'{table.solves} of {table.unknowns} unknowns'
+    yield (f'{blocks}: largest error of the solver',
+           f'{table.measured_error:.2g}, at unseen frequencies')
+    yield f'{blocks}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
 
 
 def _stability(found: Stability, units: Units) -> Iterable[tuple[str, str]]:

@@ -1,15 +1,16 @@
 """What a case answers over a range, as CSV."""
 
 from argparse import Namespace
+from collections.abc import Callable
 import math
 import sys
 
 import numpy as np
 
-from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.summary import unstable
-from rotorsoil_ros.channel import DOFS
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.cli.arguments.options import PLANT, Sweep
 from rotorsoil_ros.cli.table import (
     complex_columns,
@@ -20,7 +21,7 @@ from rotorsoil_ros.cli.table import (
     write_table,
 )
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.ground.soil import OneOfBlocks
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.prediction import Response
 from rotorsoil_ros.rotor.journal.states import JournalStates
@@ -37,21 +38,23 @@ def compliance(arguments: Namespace) -> int:
     """Write frequency, a0 and every compliance that is not zero."""
     machine = machine_of(arguments)
     case = machine.case
-    foundation, model = _contact(machine, arguments.foundation)
+    foundation, model, others = _contact(machine, arguments.foundation)
     per_a0 = (np.nan if case.soil is None else
               case.soil.shear_wave_speed / foundation.contact.characteristic_length)
     if arguments.a0 is not None and case.soil is None:
         raise InputError(f'{case.path}: soil: is missing; --a0 needs its c_s, --hz does not')
     omega = (hz_to_rad_s(values(arguments.hz)) if arguments.a0 is None
              else per_a0 * values(arguments.a0))
-    moving = np.any(model.compliance(omega) != 0.0, axis=0)
-    names = [DOFS[i] + DOFS[j] for i, j in zip(*np.nonzero(moving), strict=True)]
+    moving = np.any(model(omega) != 0.0, axis=0)
+    # Under loads on its own and then on the other blocks.
+    loads = [*DOFS, *(f'__{Channel(other, "", dof)}' for other in others for dof in DOFS)]
+    names = [DOFS[i] + loads[j] for i, j in zip(*np.nonzero(moving), strict=True)]
     # A compliance has no unit of its own in a plant: only its frequency has.
     plant = units_of(arguments) == PLANT
 
     def rows(part: FloatArray) -> FloatArray:
         key = rad_s_to_hz(part) if plant else part
-        found = complex_columns(model.compliance(part)[:, moving])
+        found = complex_columns(model(part)[:, moving])
         return np.concatenate([np.stack([key, part / per_a0], axis=1), found], axis=1)
 
     header = ['frequency_hz' if plant else 'omega_rad_s', 'a0', *complex_names(names)]
@@ -59,17 +62,33 @@ def compliance(arguments: Namespace) -> int:
     return 0
 
 
-def _contact(machine: Machine, name: str | None) -> tuple[Foundation, SoilModel]:
-    """Return the block of that name, or the only one, and what it stands on."""
+def _contact(
+    machine: Machine, name: str | None,
+) -> tuple[Foundation, Callable[[FloatArray], ComplexArray], list[str]]:
+    """
+    Return the block of that name, or the only one, how it gives way, and who moves it too.
+
+    How it gives way are six rows under loads on itself and on those that share its ground.
+    """
     model = machine.model
-    contacts = {foundation.name: (foundation, soil) for foundation, soil
-                in zip(model.foundations, model.soil_models, strict=True)}
-    if name is None and len(contacts) == 1:
-        name = next(iter(contacts))
-    if name is None or name not in contacts:
+    names = [block.name for block in model.foundations]
+    if name is None and len(names) == 1:
+        [name] = names
+    if name is None or name not in names:
         raise InputError(f'{machine.case.path}: foundations: --foundation must be one of '
-                         f'{", ".join(contacts) or "none, there is no block"}, got {name}')
-    return contacts[name]
+                         f'{", ".join(names) or "none, there is no block"}, got {name}')
+    index = names.index(name)
+    soil = model.support.soils[index]
+    if not isinstance(soil, OneOfBlocks):
+        return model.foundations[index], soil.compliance, []
+    own, ground = slice(6 * index, 6 * index + 6), soil.ground
+
+    def rows(omega: FloatArray) -> ComplexArray:
+        found = ground.compliance(omega)[:, own]
+        return np.concatenate([found[..., own], found[..., :own.start], found[..., own.stop:]],
+                              axis=-1)
+
+    return model.foundations[index], rows, names[:index] + names[index + 1:]
 
 
 def response(arguments: Namespace) -> int:

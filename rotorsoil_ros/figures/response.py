@@ -1,6 +1,6 @@
 """What a case answers, as figures for print: every axis has its unit."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,9 +13,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import ACROSS, across, Channel, DOFS, HOUSING, JOURNAL
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.figures.drawing import machine_drawing
-from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.soil import Circle
+from rotorsoil_ros.ground.soil import Circle, Soil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
@@ -287,28 +285,40 @@ def tidy(axes: Axes) -> None:
     axes.margins(x=0.01)
 
 
-_POINTS = 241
 _PERCENT = 100.0
 
 
-def compliance_figure(name: str, block: Foundation, infinite: InfiniteElementModel) -> Figure:
-    """Draw the compliance of both models below a block over a0, a row for each direction."""
-    soil = infinite.soil
-    cone = ConeModel(soil, block.contact)
+def compliance_figure(
+    name: str, block: Foundation, soil: Soil, models: Mapping[str, SoilModel], omega: FloatArray,
+) -> Figure:
+    """
+    Draw the compliance of several models below a block over a0, a row for each direction.
+
+    Parameters
+    ----------
+    name : str
+        Of the case.
+    block, soil
+        What stands on what.
+    models : mapping of str to SoilModel
+        By their names; the last is what the others are compared with.
+    omega : (n,) float array
+        Frequencies that all of them know [rad/s].
+
+    """
     scale = block.contact.characteristic_length / soil.shear_wave_speed
-    omega = np.linspace(*infinite.omega_range, _POINTS)
-    values = [np.diagonal(model.compliance(omega), axis1=1, axis2=2)
-              for model in (cone, infinite)]
-    dofs = np.flatnonzero(np.all([np.any(one != 0.0, axis=0) for one in values], axis=0))
+    values = {label: np.diagonal(model.compliance(omega), axis1=1, axis2=2)
+              for label, model in models.items()}
+    dofs = np.flatnonzero(np.all([np.any(one != 0.0, axis=0) for one in values.values()], axis=0))
     figure = Figure(figsize=(7.5, 1.75 * len(dofs) + 1.0), layout='constrained')
     grid = figure.subplots(len(dofs), 3, sharex=True, squeeze=False)
     for dof, row in zip(dofs, grid, strict=True):
-        _draw_dof(row, omega * scale, values[0][:, dof], values[1][:, dof])
+        _draw_dof(row, omega * scale, {label: one[:, dof] for label, one in values.items()})
         unit = 'nm/N' if len(DOFS[dof]) == 1 else 'nrad/(N m)'
         row[0].set_ylabel(f'{DOFS[dof]} [{unit}]')
         row[2].set_ylabel('[%]', fontsize=8)
     for axes, title in zip(grid[0], ('real part', 'imaginary part',
-                                     'cone less elements / |elements|'), strict=True):
+                                     f'off {list(models)[-1]}, |difference| / |N|'), strict=True):
         axes.set_title(title, fontsize=8)
     for axes in grid[-1]:
         axes.set_xlabel('a0 [-]')
@@ -319,19 +329,17 @@ def compliance_figure(name: str, block: Foundation, infinite: InfiniteElementMod
     return figure
 
 
-def _draw_dof(
-    row: np.ndarray, a0: FloatArray, cone: ComplexArray, infinite: ComplexArray,
-) -> None:
+def _draw_dof(row: np.ndarray, a0: FloatArray, values: Mapping[str, ComplexArray]) -> None:
     """Draw real part, imaginary part and difference of one direction in three axes."""
     real, imaginary, difference = row
-    for axes, part in ((real, np.real), (imaginary, np.imag)):
-        axes.plot(a0, 1e9 * part(cone), color=COLOURS[0], label='cone')
-        axes.plot(a0, 1e9 * part(infinite), color=COLOURS[1], linestyle='--',
-                  label='infinite elements')
-    for part, line, name in ((np.real, '-', 'real'), (np.imag, '--', 'imaginary')):
-        share = part(cone - infinite) / np.abs(infinite)
-        difference.plot(a0, _PERCENT * share, color='black', linestyle=line,
-                        label=f'difference, {name} part')
+    *others, reference = values.values()
+    for (label, one), colour, line in zip(values.items(), COLOURS, ('-', '-.', '--'),
+                                          strict=False):
+        for axes, part in ((real, np.real), (imaginary, np.imag)):
+            axes.plot(a0, 1e9 * part(one), color=colour, linestyle=line, label=label)
+    for one, colour, line in zip(others, COLOURS, ('-', '-.'), strict=False):
+        difference.plot(a0, _PERCENT * np.abs(one / reference - 1.0), color=colour,
+                        linestyle=line)
     for axes in (real, imaginary, difference):
         axes.axhline(0.0, color='black', linewidth=0.5)
         tidy(axes)

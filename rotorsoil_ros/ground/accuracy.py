@@ -6,26 +6,26 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.channel import DOFS
+from rotorsoil_ros.ground.plan import clearance, Part
 from rotorsoil_ros.ground.soil import (
     Circle,
     Contact,
-    extents,
+    parts_of,
     second_opinion_of,
     singular_of,
     SoilModel,
 )
 
-# Largest error of any stiffness where discs of equal area and second moment stand for a welded
-# rectangle, over a0 up to 3.8 and nu 0.25 to 1/3, against rigorous solutions of the rectangle:
-# `python -m benchmarks.model_errors` for 1 and 2; longer ones were measured with more tables.
-_RATIOS = (1.0, 1.5, 2.0, 3.0, 4.2)
-_MAPPING = (0.13, 0.16, 0.24, 0.36, 0.37)
+# Half side of what stands for a point [m].
+_POINT = 1e-300
 
 # Largest error of cones under a disc, any motion, a0 up to 6: theory manual, cones.
 CONE_ERROR = 0.25
 
 # Largest coupling |N_ij| / sqrt(N_ii N_jj) of two squares at a0 = 2 over their gap in half-widths,
-# and the change of a block's own compliance by an unloaded neighbour.
+# and the change of a block's own compliance by an unloaded neighbour:
+# `python -m benchmarks.shapes`.
 _GAPS = (0.25, 1.0, 4.0, 16.0)
 _COUPLINGS = (0.45, 0.29, 0.20, 0.13)
 _CHANGES = (0.11, 0.08, 0.024, 0.012)
@@ -63,45 +63,56 @@ class StifferGround:
         return np.asarray(self.model.compliance(omega) / (1.0 + self.share))
 
 
-def side_ratio(contact: Contact) -> float:
-    """Return length over width of a contact, at least 1."""
-    sides = [last - first for first, last in extents(contact)]
-    return max(sides) / min(sides)
-
-
-def mapping_error(contact: Contact) -> float:
+@dataclass(frozen=True, slots=True)
+class ShapeError:
     """
-    Return how far a stiffness may be off as a disc stands for the contact.
+    How far a model is from what it stands for, at its worst.
+
+    Attributes
+    ----------
+    share : float
+        |N / N_exact - 1| of a diagonal compliance [-].
+    dof : str
+        Which.
+    omega : float
+        Where [rad/s].
+
+    """
+
+    share: float
+    dof: str
+    omega: float
+
+
+def shape_error(model: SoilModel, exact: SoilModel, omega: FloatArray) -> ShapeError:
+    """
+    Compare the diagonal of two compliances of one contact.
 
     Parameters
     ----------
-    contact : Contact
-        A circle is its own disc.
-
-    Returns
-    -------
-    float
-        Share of the stiffness; infinite for rectangles longer than any that was measured.
+    model, exact : SoilModel
+        What stands for the contact, and what knows its shape.
+    omega : (n,) float array
+        Frequencies at which both are known [rad/s].
 
     """
-    if isinstance(contact, Circle):
-        return 0.0
-    ratio = side_ratio(contact)
-    if ratio > _RATIOS[-1]:
-        return math.inf
-    return float(np.interp(math.log(ratio), np.log(_RATIOS), _MAPPING))
+    one, other = (np.diagonal(each.compliance(omega), axis1=1, axis2=2)
+                  for each in (model, exact))
+    off = np.abs(one / other - 1.0)
+    row, dof = np.unravel_index(off.argmax(), off.shape)
+    return ShapeError(float(off[row, dof]), DOFS[dof], float(omega[row]))
 
 
-def gap(one: Contact, other: Contact, *, distance: float) -> float:
+def gap(one: Contact, other: Contact, *, apart: tuple[float, float]) -> float:
     """
-    Return the clear distance between two contacts that lie one behind the other along y.
+    Return the clear distance between two contacts.
 
     Parameters
     ----------
     one, other : Contact
-        Both centred on the shaft's plane.
-    distance : float
-        Of their centres along y [m].
+        On one ground.
+    apart : (x, y)
+        From the centre of the one to that of the other [m].
 
     Returns
     -------
@@ -109,21 +120,27 @@ def gap(one: Contact, other: Contact, *, distance: float) -> float:
         [m]; negative where they overlap.
 
     """
-    return distance - _reach(one) - _reach(other)
+    def reach(contact: Contact) -> tuple[float, tuple[Part, ...]]:
+        # A circle is a point with all of its radius around it.
+        if isinstance(contact, Circle):
+            return contact.radius, (Part(_POINT, _POINT, 0.0, 0.0),)
+        return 0.0, parts_of(contact)
+
+    (first, mine), (second, theirs) = reach(one), reach(other)
+    return min(clearance(part, Part(two.half_width, two.half_length, two.x + apart[0],
+                                    two.y + apart[1]))
+               for part in mine for two in theirs) - first - second
 
 
-def _reach(contact: Contact) -> float:
-    _, (first, last) = extents(contact)
-    return 0.5 * (last - first)
-
-
-def neglected_coupling(one: Contact, other: Contact, *, distance: float) -> tuple[float, float]:
+def neglected_coupling(
+    one: Contact, other: Contact, *, apart: tuple[float, float],
+) -> tuple[float, float]:
     """
     Return what is left out where two blocks are taken as alone on the ground.
 
     Parameters
     ----------
-    one, other, distance
+    one, other, apart
         As in `gap`.
 
     Returns
@@ -135,6 +152,6 @@ def neglected_coupling(one: Contact, other: Contact, *, distance: float) -> tupl
 
     """
     half = 0.5 * math.sqrt(max(one.area, other.area))
-    clear = math.log(max(gap(one, other, distance=distance) / half, _GAPS[0]))
+    clear = math.log(max(gap(one, other, apart=apart) / half, _GAPS[0]))
     return (float(np.interp(clear, np.log(_GAPS), _COUPLINGS)),
             float(np.interp(clear, np.log(_GAPS), _CHANGES)))

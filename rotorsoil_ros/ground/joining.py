@@ -63,7 +63,7 @@ def laplace_point(a0: FloatArray, loss_factor: float) -> ComplexArray:
 
 def joined(
     what: str, solve: Solve, span: tuple[float, float], *, loss_factor: float, scale: Scale,
-    tolerance: float, progress: Progress | None = None,
+    tolerance: float, accepted: float | None = None, progress: Progress | None = None,
 ) -> Joined:
     """
     Return rational functions that are as good between the solved frequencies as at them.
@@ -82,6 +82,8 @@ def joined(
         From values (n, q) to what their errors are measured against.
     tolerance : float
         Largest error at frequencies that the functions have not seen.
+    accepted : float, optional
+        Error that will do where solves with noise of their own never meet the tolerance.
     progress : callable, optional
         Called with the number of solves and the last measured error.
 
@@ -129,6 +131,8 @@ def joined(
         error = max(error, difference(fit(everywhere), checked(everywhere)))
         if error <= tolerance:
             return Joined(fit, error, a0.size)
+    if accepted is not None and error <= accepted:
+        return Joined(fit, error, a0.size)
     raise NotSolvedError(
         f'the compliance of {what} still has an error of {error:.1e} after {a0.size} solves, '
         f'allowed is {tolerance:g}')

@@ -110,8 +110,8 @@ def test_probe_is_a_channel():
     ('soil=3', 'soil: must hold keys and values, got 3'),
     ('rotor.discs=3', 'rotor.discs: must be a list, got 3'),
     ('support.model=cones',
-     "support.model: must be 'rigid', 'cone', 'infinite_elements', 'thin_layers' or 'table', got "
-     "'cones'"),
+     "support.model: must be 'rigid', 'cone', 'infinite_elements', 'boundary_elements', "
+     "'thin_layers' or 'table', got 'cones'"),
     ('foundations.0.inertia=[1, 2]', 'foundations.0.inertia.2: is missing'),
     ('foundations.0.inertia=[1, 2, 3, 4]',
      'foundations.0.inertia: has more entries than it should: [1, 2, 3, 4]'),
@@ -139,9 +139,9 @@ def test_probe_is_a_channel():
                                          "must be one of ['block'], got blok"),
     ('rotor.material=', 'rotor.material: is missing, and so is that of rotor.shaft.0'),
     ('foundations.0.radius=0.5',
-     'foundations.0: needs either half_width and half_length or radius, in m'),
+     'foundations.0: needs either half_width and half_length, or parts, or radius, in m'),
     ('foundations.0.half_length=',
-     'foundations.0: needs either half_width and half_length or radius, in m'),
+     'foundations.0: needs either half_width and half_length, or parts, or radius, in m'),
     ('foundations.0.name=other', 'foundations.0: no bearing stands on other'),
     ('foundations=[]', 'foundations: is missing; the support model cone needs a block'),
     ('soil=', 'soil: is missing; the support model cone needs it'),

@@ -1,15 +1,22 @@
 """What can be said of the ground of a case: its layers, the error of its model, its band."""
 
-from collections.abc import Iterator
-import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import INPUTS
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
-from rotorsoil_ros.ground.accuracy import CONE_ERROR, mapping_error, side_ratio
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
+from rotorsoil_ros.channel import DOFS
+from rotorsoil_ros.ground.accuracy import CONE_ERROR, gap, neglected_coupling, ShapeError
+from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
-from rotorsoil_ros.ground.soil import Rectangle
+from rotorsoil_ros.ground.plan import Plan
+from rotorsoil_ros.ground.soil import Circle, Contact, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.units import rad_s_to_hz
 
 # Supports that take a rectangle as discs.
 _BY_DISCS = ('cone', 'infinite_elements', THIN_LAYERS)
@@ -40,26 +47,89 @@ def layers_told(case: Case) -> Iterator[tuple[str, str]]:
                 'wall welded; its mass is all that counts, not that of the soil it displaces')
 
 
-def model_error(case: Case, foundation: Foundation) -> str:
-    """Return how far the model of the ground under a block may be off; empty if it has none."""
-    if case.support.model not in _BY_DISCS or case.support.geometry != 'disc':
+def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) -> str:
+    """
+    Return how far the model of the ground under a block is off; empty if it has no error.
+
+    Parameters
+    ----------
+    case, foundation
+        The machine and one of its blocks.
+    shape : ShapeError or None
+        How far it is from the shape of the block over the speed range, where that is known.
+
+    """
+    support, contact = case.support.model, foundation.contact
+    if support == BOUNDARY_ELEMENTS:
+        alone = len(case.foundations) == 1 and not isinstance(contact, Plan)
+        return f'boundary elements of this plan: within {0.5 if alone else 1.0:g}%'
+    if support not in _BY_DISCS or case.support.geometry != 'disc':
         return ''
-    parts = []
-    if case.support.model == 'cone':
-        parts.append(f'cones under a disc: stiffness within {CONE_ERROR:.0%}')
-    if isinstance(foundation.contact, Rectangle):
-        share, ratio = mapping_error(foundation.contact), side_ratio(foundation.contact)
-        off = f'up to {share:.0%}' if share < math.inf else 'more than 37%'
-        parts.append(f'discs for a rectangle of {ratio:.3g} to 1: stiffness off by {off}')
-    if case.support.model == THIN_LAYERS:
-        parts.insert(0, 'thin layers under a disc: within 0.1%')
-    return '; '.join(parts) or 'infinite elements of a disc: within 0.5%'
+    parts = ['thin layers under a disc: within 0.1%'] if support == THIN_LAYERS else []
+    if isinstance(contact, Circle) and support == 'infinite_elements':
+        parts.append('infinite elements of a disc: within 0.5%')
+    elif not isinstance(contact, Circle) or support == 'cone':
+        what = f'{"cones under discs" if support == "cone" else "discs"} for {_shape(contact)}'
+        if shape is None:
+            known = f'within {CONE_ERROR:.0%}' if isinstance(contact, Circle) else (
+                'not known, where boundary elements do not reach')
+            parts.append(f'{what}: {known}')
+        else:
+            where = ' on a half-space of the soil below it' if support == THIN_LAYERS else ''
+            parts.append(
+                f'{what}{where}: compliance off by up to {shape.share:.0%} over the speed range '
+                f'({shape.dof} at {rad_s_to_hz(shape.omega):.3g} Hz), against '
+                f'{"infinite" if isinstance(contact, Circle) else "boundary"} elements')
+    return '; '.join(parts)
+
+
+def _shape(contact: Contact) -> str:
+    match contact:
+        case Circle():
+            return 'a circle'
+        case Plan(parts=parts):
+            return f'a plan of {len(parts)} parts'
+    sides = contact.half_width, contact.half_length
+    return f'a rectangle of {max(sides) / min(sides):.3g} to 1'
+
+
+def of_site(case: Case, soil_models: Sequence[SoilModel]) -> Iterator[tuple[str, str]]:
+    """Yield how much blocks on one ground move each other, and where probes on it are."""
+    if not (len(soil_models) == 1 and isinstance(soil_models[0], BoundaryElementModel)):
+        return
+    found = np.abs(soil_models[0].compliance(np.array([case.speed_range[1]]))[0])
+    own = np.sqrt(np.diagonal(found))
+    share = found / np.outer(own, own)
+    for second, other in enumerate(case.foundations):
+        for first, block in enumerate(case.foundations[:second]):
+            between = share[6 * first:6 * first + 6, 6 * second:6 * second + 6]
+            row, column = np.unravel_index(between.argmax(), between.shape)
+            yield f'{block.name} and {other.name}: coupled through the ground', (
+                f'up to {between.max():.0%} of their own motion ({block.name} {DOFS[row]} by '
+                f'{other.name} {DOFS[column]}) at full speed')
+    for probe in case.ground_probes:
+        yield f'{probe.name}: on the ground', f'x {probe.x:g} m, y {probe.y:g} m'
+
+
+def of_neighbours(case: Case) -> Iterator[str]:
+    """Yield which blocks are coupled through a soil that takes each as alone."""
+    if case.support.model in ('rigid', BOUNDARY_ELEMENTS):
+        return
+    for second, block in enumerate(case.foundations):
+        for other in case.foundations[:second]:
+            apart = other.centre_x - block.centre_x, other.centre_y - block.centre_y
+            coupling, change = neglected_coupling(block.contact, other.contact, apart=apart)
+            clear = gap(block.contact, other.contact, apart=apart)
+            yield (f'{block.name}: stands {max(clear, 0.0):.3g} m beside {other.name}; each is '
+                   'taken as alone on the ground: a load on one moves the other by up to '
+                   f'{coupling:.0%} of its own motion, and its own changes by up to {change:.0%}; '
+                   f'support.model {BOUNDARY_ELEMENTS} couples them')
 
 
 def band_contents(case: Case) -> str:
     """Return what the edges of the band of a case hold; empty if it has none."""
     spread, knows_soil = case.uncertainty, (
-        case.soil is not None and case.support.model in _BY_DISCS)
+        case.soil is not None and case.support.model in (*_BY_DISCS, BOUNDARY_ELEMENTS))
     parts = [f'{INPUTS[name].words} ({_extent(getattr(spread, name))})'
              for name in spread.inputs(with_soil=knows_soil) if name not in _SOIL]
     if case.soil is None or not knows_soil:
@@ -68,14 +138,25 @@ def band_contents(case: Case) -> str:
                     f'{spread.poisson_ratio:g}, eta within {spread.loss_factor:g})')
     if not spread.model_form or case.support.geometry != 'disc':
         return '; '.join([*parts, 'not the error of the models'])
+    parts.append(_other_forms_of(case))
+    return '; '.join(filter(None, parts))
+
+
+def _other_forms_of(case: Case) -> str:
+    """Return which ground the band holds beside that of the case."""
+    if case.support.model not in ('cone', 'infinite_elements') or case.soil is None:
+        return ''
+    if not any(isinstance(block.contact, Circle) for block in case.foundations):
+        return ('discs against boundary elements, blocks coupled'
+                if case.soil.poisson_ratio <= HIGHEST_POISSON_RATIO else
+                'not discs against boundary elements, which end at nu = '
+                f'{HIGHEST_POISSON_RATIO:g}')
     if case.support.model == 'cone':
-        known = case.soil.poisson_ratio <= LARGEST_POISSON_RATIO
-        parts.append('cones against infinite elements' if known else
-                     'not cones against infinite elements, which end at nu = '
-                     f'{LARGEST_POISSON_RATIO:g}')
-    if any(isinstance(block.contact, Rectangle) for block in case.foundations):
-        parts.append('discs against rectangles')
-    return '; '.join(parts)
+        return ('cones against infinite elements'
+                if case.soil.poisson_ratio <= LARGEST_POISSON_RATIO else
+                'not cones against infinite elements, which end at nu = '
+                f'{LARGEST_POISSON_RATIO:g}')
+    return ''
 
 
 def _extent(spread: object) -> str:

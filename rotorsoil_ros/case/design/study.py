@@ -15,6 +15,7 @@ from rotorsoil_ros.case.design.ground import band_contents, model_error
 from rotorsoil_ros.case.design.influence import extremes, influences
 from rotorsoil_ros.case.design.margins import near_modes
 from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
+from rotorsoil_ros.case.models import shape_errors
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, HOUSING
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
@@ -62,7 +63,7 @@ def design_report(machine: 'Machine', rpm: float) -> DesignReport:
         stable=found.stable, housings=housings, modes=modes,
         damping=_damping(machine, rpm), influences=moved,
         next_step=next_step(machine, found, housings, modes, moved),
-        assumptions=tuple(_assumptions(case)), not_modelled=tuple(_not_modelled(case)),
+        assumptions=tuple(_assumptions(machine)), not_modelled=tuple(_not_modelled(case)),
         guesses=tuple(_guesses(case)))
 
 
@@ -110,13 +111,15 @@ def _housings(
     return tuple(sorted(found, key=lambda one: -one.badness))
 
 
-def _assumptions(case: Case) -> Iterator[str]:
+def _assumptions(machine: 'Machine') -> Iterator[str]:
+    case = machine.case
     ground = case.support.model.replace('_', ' ')
     yield f'ground: {ground}' + ('' if case.soil is None else (
         f', c_s {case.soil.shear_wave_speed:.4g} m/s, nu {case.soil.poisson_ratio:g}, '
         f'{case.soil.density:g} kg/m^3'))
-    for block in case.foundations:
-        if told := model_error(case, block):
+    shapes = shape_errors(case, machine.model.support.soils, machine.directory)
+    for block, shape in zip(case.foundations, shapes, strict=True):
+        if told := model_error(case, block, shape):
             yield f'{block.name}: {told}'
     for disc, moment in zip(case.rotor.discs, case.unbalance, strict=False):
         if moment:

@@ -6,6 +6,7 @@ from typing import Any
 
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.layers.profile import (
     Embedment,
@@ -105,6 +106,10 @@ class GroundEntries:
                 'homogeneous half-space only' + (
                     ': cones on rock miss its resonance by a factor of up to 2.3 and radiate '
                     'where nothing can' if support.model == 'cone' else '')))
+        if support.model == BOUNDARY_ELEMENTS and support.geometry != 'disc':
+            raise self.faults.error('support', 'geometry', problem=(
+                'belongs to the support model infinite_elements; boundary elements take the plan '
+                f'of the block as it is, got {support.geometry}'))
         if support.model in ('cone', 'table', THIN_LAYERS) and support.geometry != 'disc':
             raise self.faults.error(
                 'support', 'geometry', problem=f'must be disc for the model {support.model}, '

@@ -35,8 +35,9 @@ class BoundaryElementModel:
     the Poisson's ratios of two tables the compliance is interpolated linearly, which keeps it
     passive; beyond them it is scaled by the static compliances of a disc (`static_scale`).
 
-    Where radiation is weaker than the error of the tables, -Im N is lifted to be positive
-    semidefinite: by less than 1e-4 of a motion's own size, as rows of a table are joined.
+    Where radiation is weaker than the error of the tables, a loss of less than 3e-4 of a motion's
+    own size, which is an analytic function of frequency as all the rest, keeps -Im N positive
+    semidefinite (`BoundaryTable.loss`).
 
     """
 
@@ -119,8 +120,7 @@ class BoundaryElementModel:
 
         """
         size = 6 * self.blocks
-        values = self._values(omega)[..., :size, :]
-        return kept_passive(values.reshape(-1, size, size)).reshape(values.shape)
+        return self._values(omega)[..., :size, :]
 
     def point_motion(self, omega: FloatArray) -> ComplexArray:
         """
@@ -168,22 +168,3 @@ class BoundaryElementModel:
         own = np.tile([1.0] * 3 + [1.0 / length] * 3, self.blocks)
         rows = np.concatenate([own, np.ones(3 * len(self.site.points))])
         return np.asarray(values * np.outer(rows, own) / (self.soil.shear_modulus * length))
-
-
-def kept_passive(compliance: ComplexArray) -> ComplexArray:
-    """Return compliances (n, d, d) whose losses -Im N are lifted to be no gain."""
-    size = np.sqrt(np.abs(np.diagonal(compliance, axis1=1, axis2=2)))
-    unit = size[:, :, None] * size[:, None]
-    loss = -compliance.imag / unit
-    try:
-        np.linalg.cholesky(loss)
-    except np.linalg.LinAlgError:
-        # Some row gives energy, by as much as round-off or the fit of the tables.
-        values, vectors = np.linalg.eigh(loss)
-        gains = values[:, 0] < 0.0
-        lifted = (vectors[gains] * np.maximum(values[gains], 0.0)[:, None]) @ (
-            vectors[gains].swapaxes(1, 2))
-        lifted = 0.5 * (lifted + lifted.swapaxes(1, 2))  # reciprocal to the last bit
-        compliance = compliance.copy()
-        compliance[gains] = compliance[gains].real - 1j * lifted * unit[gains]
-    return compliance

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ BOUNDARY_ALGORITHM = 1
 _SLOWNESS = 1.08
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class BoundaryTable:
     """
     Compliance of a site of unit length on a half-space with G = rho = 1.
@@ -43,6 +44,9 @@ class BoundaryTable:
         Largest error at frequencies that a fit had not seen, of sqrt(N_ii N_jj).
     solves, unknowns : int
         Number of exact solves, and unknowns of each.
+    loss : float
+        Share of each static compliance N_0 that follows its load late, loss N_0 / (1 + s): it
+        dissipates at least what the error of solves and fit lets the rest give [-].
 
     """
 
@@ -55,6 +59,7 @@ class BoundaryTable:
     measured_error: float
     solves: int
     unknowns: int
+    loss: float = 0.0
 
     def values(self, a0: FloatArray, loss_factor: float) -> ComplexArray:
         """Return compliance above motion of the points, (n, 6 k + 3 p, 6 k), on such a soil."""
@@ -67,13 +72,25 @@ class BoundaryTable:
         found[:, rows, columns] = flat
         inside = rows < size
         found[:, columns[inside], rows[inside]] = flat[:, inside]
+        own = np.arange(size)
+        found[:, own, own] += self.loss * self._at_rest / (
+            (1.0 + point) * (1.0 + 1j * loss_factor))[:, None]
+        return found
+
+    @cached_property
+    def _at_rest(self) -> FloatArray:
+        """Diagonal of the elastic compliance at rest, (6 k,)."""
+        diagonal = self.entries[:, 0] == self.entries[:, 1]
+        found = np.zeros(6 * len(self.site.blocks))
+        found[self.entries[diagonal, 0]] = self.function(np.zeros(1, dtype=complex))[
+            0, diagonal].real
         return found
 
     def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the table as plain arrays; its site is part of the key it is found by."""
         return {
             'kind': np.array([self.poisson_ratio, self.loss_factor, self.a0_max,
-                              self.measured_error, self.solves, self.unknowns]),
+                              self.measured_error, self.solves, self.unknowns, self.loss]),
             'support': self.function.support, 'values': self.function.values,
             'weights': self.function.weights, 'entries': self.entries}
 
@@ -92,7 +109,7 @@ class BoundaryTable:
         """
         try:
             kind = np.asarray(arrays['kind'], dtype=float)
-            poisson_ratio, loss_factor, a0_max, measured, solves, unknowns = kind.tolist()
+            poisson_ratio, loss_factor, a0_max, measured, solves, unknowns, loss = kind.tolist()
             function = RationalFunction(*(np.asarray(arrays[name], dtype=complex)
                                           for name in ('support', 'values', 'weights')))
             entries = np.asarray(arrays['entries'], dtype=int)
@@ -105,7 +122,7 @@ class BoundaryTable:
                 np.isfinite(part).all() for part in parts) and entries[:, 1].max() < size):
             raise RotorSoilError('not a table of boundary elements: wrong shapes or not finite')
         return cls(site, poisson_ratio, loss_factor, a0_max, function, entries, measured,
-                   int(solves), int(unknowns))
+                   int(solves), int(unknowns), loss)
 
 
 def delays(site: Site) -> FloatArray:

@@ -1,6 +1,6 @@
 """Boundary elements for one site: the method that fits, and a table of its answers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -13,14 +13,20 @@ from rotorsoil_ros.ground.boundary.rectangle import RectangleSolver
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BoundaryTable, delays
 from rotorsoil_ros.ground.boundary.waves import SurfaceWaves
-from rotorsoil_ros.ground.joining import joined
+from rotorsoil_ros.ground.joining import joined, laplace_point
 
 # Lowest frequency that is solved, over the highest; below, the functions know themselves to be
 # even and odd about zero.
 _LOWEST = 0.01
 
-# Largest error between the solved frequencies, of the geometric mean of two diagonals.
-_JOIN_TOLERANCE = 2e-4
+# Largest error between the solved frequencies, of the geometric mean of two diagonals: of series,
+# of patches, whose solves have some noise of their own, and what will do at worst.
+_SERIES_TOLERANCE, _PATCH_TOLERANCE, _ACCEPTED = 5e-6, 3e-5, 1e-3
+
+# Frequencies at which a table is looked at for energy, and how much more than what it gives there
+# it has to lose.
+_CHECKED = 400
+_MARGIN = 1.5
 
 # Entries below this share of their diagonals are zero by symmetry.
 _NONE = 1e-10
@@ -80,15 +86,32 @@ def tabulated(
     rows, columns = entries.T
     ahead, slow = delays(site)[rows, columns], math.sqrt(abs(stiff))
 
+    tolerance = _PATCH_TOLERANCE if site.rectangle is None or site.points else _SERIES_TOLERANCE
+
     def solve(point: complex) -> ComplexArray:
         found = solver.solve(abs(point) * slow)[rows, columns]
         return np.asarray(found * stiff * np.exp(point * ahead))
 
     found = joined('these contacts by boundary elements', solve, (_LOWEST * a0_max, a0_max),
                    loss_factor=loss_factor, scale=lambda values: _scale(values, entries),
-                   tolerance=_JOIN_TOLERANCE)
-    return BoundaryTable(site, poisson_ratio, loss_factor, a0_max, found.function, entries,
-                         found.measured_error, found.solves, solver.unknowns)
+                   tolerance=tolerance, accepted=_ACCEPTED)
+    return passive(BoundaryTable(site, poisson_ratio, loss_factor, a0_max, found.function, entries,
+                                 found.measured_error, found.solves, solver.unknowns))
+
+
+def passive(table: BoundaryTable) -> BoundaryTable:
+    """Return a table whose loss is just large enough that it gives energy nowhere."""
+    a0 = table.a0_max * np.linspace(0.0, 1.0, _CHECKED)[1:] ** 2
+    needed = 0.0
+    for loss_factor in {0.0, table.loss_factor}:
+        size = 6 * len(table.site.blocks)
+        values = table.values(a0, loss_factor)[:, :size]
+        own = np.sqrt(table.values(np.zeros(1), 0.0)[0].diagonal().real)
+        gain = -np.linalg.eigvalsh(-values.imag / np.outer(own, own))[:, 0]
+        # What a late share of one would dissipate of each static compliance.
+        late = -(1.0 / (1.0 + laplace_point(a0, 0.0))).imag
+        needed = max(needed, float((gain / late).max()))
+    return replace(table, loss=_MARGIN * needed)
 
 
 def _entries(found: ComplexArray) -> IntArray:

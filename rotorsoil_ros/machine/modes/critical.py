@@ -216,22 +216,30 @@ def _close(
     """Close all brackets at once by the false position, in its Illinois variant."""
     if not len(ends):
         return []
-    wanted, rows = unit_shapes(shapes).conj().transpose(0, 2, 1), np.arange(len(ends))
-    last = np.full(len(ends), -1)
-    for _ in range(_STEPS):
-        speed = ((ends[:, 0] * excess[:, 1] - ends[:, 1] * excess[:, 0])
-                 / (excess[:, 1] - excess[:, 0]))
+    wanted, last = unit_shapes(shapes).conj().transpose(0, 2, 1), np.full(len(ends), -1)
+    closed: dict[int, CriticalSpeed] = {}
+    still = np.arange(len(ends))
+    for step in range(_STEPS):
+        low, high = ends[still].T
+        before, after = excess[still].T
+        speed = (low * after - high * before) / (after - before)
         found = solver.solve(speed, _ALL)
         # Of all modes at a speed the one most like those at both ends.
-        mode = np.nansum(np.abs(unit_shapes(found.shape) @ wanted), axis=2).argmax(axis=1)
-        height = found.frequency[rows, mode].real - speed
-        if np.all(np.abs(height) <= _FOUND * speed):
+        mode = np.nansum(np.abs(unit_shapes(found.shape) @ wanted[still]), axis=2).argmax(axis=1)
+        height = found.frequency[np.arange(len(still)), mode].real - speed
+        # A bracket that has shrunk to a jump from one mode to another holds no crossing to find.
+        done = ((np.abs(height) <= _FOUND * speed) | (np.abs(high - low) <= _FOUND * speed)
+                | (step == _STEPS - 1))
+        for row in np.flatnonzero(done).tolist():
+            closed[int(still[row])] = _critical(
+                solver, found, float(speed[row]), row, int(mode[row]))
+        side = np.where((height > 0.0) == (before > 0.0), 0, 1)
+        excess[still, 1 - side] *= np.where(side == last[still], 0.5, 1.0)
+        ends[still, side], excess[still, side], last[still] = speed, height, side
+        still = still[~done]
+        if not len(still):
             break
-        side = np.where((height > 0.0) == (excess[:, 0] > 0.0), 0, 1)
-        excess[rows, 1 - side] *= np.where(side == last, 0.5, 1.0)
-        ends[rows, side], excess[rows, side], last = speed, height, side
-    return [_critical(solver, found, float(speed[row]), row, int(mode[row]))
-            for row in range(len(speed))]
+    return [closed[row] for row in sorted(closed)]
 
 
 def _critical(

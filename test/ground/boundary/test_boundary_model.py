@@ -1,18 +1,19 @@
 """Boundary elements against rigorous contacts, invariants and themselves in other words."""
 
 import csv
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
-from rotorsoil_ros.ground.boundary.model import BoundaryElementModel, kept_passive
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.boundary.patches import PatchSolver
 from rotorsoil_ros.ground.boundary.rectangle import RectangleSolver
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BoundaryTable
-from rotorsoil_ros.ground.boundary.tabulate import tabulated
+from rotorsoil_ros.ground.boundary.tabulate import passive, tabulated
 from rotorsoil_ros.ground.boundary.waves import SurfaceWaves
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.plan import Part
@@ -95,8 +96,8 @@ def test_a_rectangle_that_lies_across_is_the_other_one_turned():
                      for contact in (Rectangle(1.0, 2.0), Rectangle(2.0, 1.0)))
     one, other = (model.compliance(np.array([1.3]))[0] for model in (along, across))
     turned = one[[1, 0, 2, 4, 3, 5]][:, [1, 0, 2, 4, 3, 5]]
-    np.testing.assert_allclose(np.diag(other), np.diag(turned), rtol=1e-12)
-    assert other[0, 4] == pytest.approx(-turned[0, 4], rel=1e-12)
+    np.testing.assert_allclose(np.diag(other), np.diag(turned), rtol=1e-9)
+    assert other[0, 4] == pytest.approx(-turned[0, 4], rel=1e-9)
     # At rest a load along +x tilts the contact by +ry, its front edge down.
     assert along.compliance(np.zeros(1))[0, 0, 4].real > 0.0
 
@@ -164,16 +165,19 @@ def test_every_row_is_reciprocal_and_passive():
         np.testing.assert_array_equal(values, values.swapaxes(1, 2))
         size = np.sqrt(np.abs(np.diagonal(values, axis1=1, axis2=2)))
         loss = np.linalg.eigvalsh(-values.imag / (size[:, :, None] * size[:, None]))
-        assert loss.min() > -1e-15  # round-off of what is lifted to nothing
+        assert loss.min() >= 0.0
 
 
-def test_what_would_give_energy_is_lifted_and_nothing_else():
-    active = np.array([[2.0 - 1.0j, 0.5 - 2.0j], [0.5 - 2.0j, 2.0 - 1.0j]])
-    passive = np.array([[2.0 - 1.0j, 0.5 - 0.5j], [0.5 - 0.5j, 2.0 - 1.0j]])
-    found = kept_passive(np.stack([active, passive]))
-    np.testing.assert_array_equal(found[1], passive)
-    np.testing.assert_array_equal(found[0].real, active.real)
-    assert np.linalg.eigvalsh(-found[0].imag) == pytest.approx([0.0, 3.0])
+def test_what_would_give_energy_loses_just_more_than_that():
+    site = Site.of((SQUARE, SQUARE), ((0.0, 0.0), (0.0, 2.25))).scaled()
+    table = tabulated(site, poisson_ratio=0.25, loss_factor=0.0, a0_max=2.0)
+    without = dataclasses.replace(table, loss=0.0)
+    a0 = np.linspace(0.01, 2.0, 300)
+    loss = [np.linalg.eigvalsh(-one.values(a0, 0.0).imag)[:, 0] for one in (without, table)]
+    assert loss[0].min() < 0.0 <= loss[1].min()
+    # Two meshes that are extrapolated give no more than this.
+    assert 0.0 < table.loss < 3e-4
+    assert passive(without).loss == table.loss
 
 
 def test_far_blocks_are_single_blocks():

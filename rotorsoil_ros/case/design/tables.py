@@ -1,0 +1,136 @@
+"""Which tables the ground of a case needs: solved, or out of the cache."""
+
+from rotorsoil_ros.case.cache import Cache, content_key
+from rotorsoil_ros.case.config import infinite_range, proportions
+from rotorsoil_ros.case.entries.site import site_reach
+from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.boundary.site import Site
+from rotorsoil_ros.ground.boundary.table import BOUNDARY_ALGORITHM, BoundaryTable
+from rotorsoil_ros.ground.elements.table import DimensionlessTable
+from rotorsoil_ros.ground.half_space import a0_range, ELEMENTS_ALGORITHM, InfiniteElementModel
+from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.layers.table import LayeredTable
+from rotorsoil_ros.ground.soil import Contact, Soil
+
+
+def infinite_element_model(
+    soil: Soil, contact: Contact, geometry: str, *, cache: Cache,
+    speed_range: tuple[float, float],
+) -> InfiniteElementModel:
+    """
+    Return infinite elements for a soil, solved unless a soil of its kind was before.
+
+    Parameters
+    ----------
+    soil, contact, geometry
+        As `InfiniteElementModel.solved`.
+    cache : Cache
+        Where dimensionless tables lie.
+    speed_range : tuple of two floats
+        Rotor speeds to be covered [rad/s].
+
+    """
+    low, high = infinite_range(soil, contact, geometry, speed_range)
+    key = compliance_key(
+        soil, geometry, *a0_range(soil, contact, geometry, omega_min=low, omega_max=high))
+    stored = cache.load('compliance', key)
+    if stored is not None:
+        return InfiniteElementModel(soil, contact, DimensionlessTable.from_arrays(stored))
+    model = InfiniteElementModel.solved(soil, contact, geometry, omega_min=low, omega_max=high)
+    cache.store('compliance', key, model.table.to_arrays())
+    return model
+
+
+def thin_layer_model(
+    ground: LayeredSoil, contact: Contact, embedment: Embedment, *, cache: Cache,
+    speed_range: tuple[float, float],
+) -> ThinLayerModel:
+    """
+    Return thin layers, solved unless a ground of these proportions was before.
+
+    Parameters
+    ----------
+    ground, contact, embedment
+        As `ThinLayerModel.solved`.
+    cache : Cache
+        Where dimensionless tables lie.
+    speed_range : tuple of two floats
+        Rotor speeds to be covered [rad/s].
+
+    """
+    scaled = proportions(ground, contact, embedment, speed_range)
+    key = layers_key(scaled)
+    stored = cache.load('compliance', key)
+    if stored is not None:
+        return ThinLayerModel(ground, contact, LayeredTable.from_arrays(stored), embedment)
+    table = scaled.table()
+    cache.store('compliance', key, table.to_arrays())
+    return ThinLayerModel(ground, contact, table, embedment)
+
+
+def layers_key(scaled: Proportions) -> str:
+    """Return what identifies a table of layered ground: ratios of stiffness, density and size."""
+    return content_key('layers', LAYERS_ALGORITHM, scaled)
+
+
+def boundary_element_model(
+    soil: Soil, site: Site, *, cache: Cache, speed_range: tuple[float, float],
+    spread: float = 0.0,
+) -> BoundaryElementModel:
+    """
+    Return boundary elements for a soil, solved unless a site of this kind was before.
+
+    Parameters
+    ----------
+    soil, site
+        As `BoundaryElementModel.solved_together`.
+    cache : Cache
+        Where dimensionless tables lie.
+    speed_range : tuple of two floats
+        Rotor speeds to be covered [rad/s].
+    spread : float
+        How far Poisson's ratio may be off: solved for its ends too, where it is not 0 [-].
+
+    """
+    a0_max, scaled = site_reach(site, soil, speed_range), site.scaled()
+    ends = (soil.poisson_ratio - spread, soil.poisson_ratio, soil.poisson_ratio + spread)
+    return BoundaryElementModel(soil, site, tuple(
+        _boundary_table(scaled, ratio, soil.loss_factor, a0_max, cache)
+        for ratio in sorted({min(max(end, 0.0), HIGHEST_POISSON_RATIO) for end in ends})))
+
+
+def _boundary_table(
+    site: Site, poisson_ratio: float, loss_factor: float, a0_max: float, cache: Cache,
+) -> BoundaryTable:
+    key = site_key(site, poisson_ratio, loss_factor, a0_max)
+    stored = cache.load('compliance', key)
+    if stored is not None:
+        return BoundaryTable.from_arrays(site, stored)
+    # Here and not above: what solves takes 0.1 s to import, and a stored table needs none.
+    from rotorsoil_ros.ground.boundary.tabulate import tabulated
+
+    table = tabulated(site, poisson_ratio=poisson_ratio, loss_factor=loss_factor, a0_max=a0_max)
+    cache.store('compliance', key, table.to_arrays())
+    return table
+
+
+def site_key(site: Site, poisson_ratio: float, loss_factor: float, a0_max: float) -> str:
+    """Return what identifies a table of a site of unit length."""
+    return content_key('boundary', BOUNDARY_ALGORITHM, site, poisson_ratio, loss_factor, a0_max)
+
+
+def compliance_key(soil: Soil, geometry: str, a0_min: float, a0_max: float) -> str:
+    """Return what identifies a dimensionless table: neither G, nor density, nor size."""
+    return content_key('compliance', ELEMENTS_ALGORITHM, geometry, soil.poisson_ratio,
+                       soil.loss_factor, a0_min, a0_max)
+
+
+def key_of(model: BoundaryElementModel | InfiniteElementModel) -> str:
+    """Return what identifies the dimensionless table of a model."""
+    if isinstance(model, BoundaryElementModel):
+        own = model.tables[0]
+        return site_key(own.site, own.poisson_ratio, own.loss_factor, own.a0_max)
+    table = model.table
+    return compliance_key(model.soil, table.geometry, table.a0_min, table.a0_max)
