@@ -13,7 +13,7 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
-from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.config import Case, proportions
 from rotorsoil_ros.case.design.ground import band_contents
 from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
@@ -31,8 +31,9 @@ from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, ThinLayerModel
-from rotorsoil_ros.ground.layers.profile import LEAST_LOSS_FACTOR
+from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import LayeredSoil, LEAST_LOSS_FACTOR
+from rotorsoil_ros.ground.layers.table import LayeredTable
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Circle, Contact, RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
@@ -222,14 +223,19 @@ def response_band(
     Return the response of a case on all soils of its spread, or of another one.
 
     Besides the soil it holds what else the spread says and, unless that says otherwise, the
-    error of the models: every second machine stands on infinite elements instead of cones, and
-    of each pair of these one on ground as much stiffer as a rectangle may be than its disc.
+    error of the models: every second machine stands on the ground of its own shape, blocks
+    coupled through it (boundary elements; of circles infinite elements), instead of cones and
+    discs; where that is not known, on ground as much stiffer as it may be.
     None where nothing is uncertain, as with known bearings on a support that knows of no soil.
     """
     spread = spread or case.uncertainty
     with_soil = case.soil is not None and depends_on_soil(model)
     if not with_soil and not spread.inputs(with_soil=False):
         return None
+    if case.soil is not None and case.support.model == BOUNDARY_ELEMENTS:
+        model = replace(model, soil_models=(boundary_element_model(
+            case.soil, site_of(case.foundations, case.ground_probes), cache=Cache(directory),
+            speed_range=case.speed_range, spread=spread.poisson_ratio),))
     elements, stiffer = _other_forms(case, spread, directory)
     forms = _forms(spread.places(with_soil=with_soil), with_elements=bool(elements),
                    with_stiffer=any(stiffer))
@@ -310,7 +316,7 @@ def _other_forms(
             or case.support.model not in ('cone', 'infinite_elements', THIN_LAYERS)):
         return [], stiffer
     if case.support.model == THIN_LAYERS:
-        # On layers only discs are known: how much stiffer a shape is than they, a half-space tells.
+        # On layers only discs are known: a half-space tells how much stiffer a shape is.
         shapes = shape_errors(case, [RigidSoil()] * len(stiffer), directory)
         return [], [0.0 if isinstance(block.contact, Circle) else
                     min(_MOST_STIFFER if shape is None else shape.share, _MOST_STIFFER)

@@ -14,6 +14,7 @@ from rotorsoil_ros.case.design.ground import (
     layers_told,
     model_error,
     of_neighbours,
+    of_shapes,
     of_site,
 )
 from rotorsoil_ros.case.journal_entries import Journal
@@ -160,8 +161,16 @@ def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
     return omega * foundation.contact.characteristic_length / soil.shear_wave_speed
 
 
-def warnings(case: Case) -> Iterator[str]:
-    """Yield what is allowed but looks like a slip, or lies where a model is poor."""
+def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[str]:
+    """
+    Yield what is allowed but looks like a slip, or lies where a model is poor.
+
+    Parameters
+    ----------
+    case, shapes
+        As `derived_quantities`.
+
+    """
     if not np.any(case.unbalance):
         yield 'unbalances: none, every prediction will be zero'
     yield from slips(case)
@@ -173,6 +182,7 @@ def warnings(case: Case) -> Iterator[str]:
     for journal in case.journals:
         yield from _of_film(case, journal)
     yield from of_neighbours(case)
+    yield from of_shapes(case, shapes)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):

@@ -71,7 +71,7 @@ def check(arguments: Namespace) -> int:
     _print_table(_of_damping(case, model, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
-                         warnings(case), depth_remarks(case, model, directory)):
+                         warnings(case, shapes), depth_remarks(case, model, directory)):
         print(f'warning: {warning}')
     growing = list(unstable(table.stability))
     for text in growing:

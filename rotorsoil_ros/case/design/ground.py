@@ -14,12 +14,17 @@ from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.plan import Plan
-from rotorsoil_ros.ground.soil import Circle, Contact, SoilModel
+from rotorsoil_ros.ground.soil import Circle, Contact, extents, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import rad_s_to_hz
 
 # Supports that take a rectangle as discs.
 _BY_DISCS = ('cone', 'infinite_elements', THIN_LAYERS)
+
+# Beyond these, length over width and share of a compliance, it is worth a warning that discs stand
+# for a contact.
+_LARGEST_ASPECT = 2.0
+_LARGEST_SHARE = 0.2
 
 # Told together, as G, nu and eta of the soil.
 _SOIL = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor')
@@ -89,8 +94,22 @@ def _shape(contact: Contact) -> str:
             return 'a circle'
         case Plan(parts=parts):
             return f'a plan of {len(parts)} parts'
-    sides = contact.half_width, contact.half_length
-    return f'a rectangle of {max(sides) / min(sides):.3g} to 1'
+    return f'a rectangle of {_side_ratio(contact):.3g} to 1'
+
+
+def _side_ratio(contact: Contact) -> float:
+    sides = [last - first for first, last in extents(contact)]
+    return max(sides) / min(sides)
+
+
+def of_shapes(case: Case, shapes: Sequence[ShapeError | None]) -> Iterator[str]:
+    """Yield which blocks are poorly served by the discs that stand for them, and by how much."""
+    for block, shape in zip(case.foundations, shapes, strict=False):
+        ratio = _side_ratio(block.contact)
+        if shape is not None and (ratio > _LARGEST_ASPECT or shape.share > _LARGEST_SHARE):
+            yield (f'{block.name}: contact is {ratio:.3g} times as long as wide; '
+                   f'{model_error(case, block, shape)}; support.model {BOUNDARY_ELEMENTS} takes '
+                   'it as it is')
 
 
 def of_site(case: Case, soil_models: Sequence[SoilModel]) -> Iterator[tuple[str, str]]:

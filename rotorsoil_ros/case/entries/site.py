@@ -83,6 +83,11 @@ class SiteEntries:
             raise self.faults.error('ground', 'probes', problem=(
                 f'need the support model {BOUNDARY_ELEMENTS}, which alone tells the motion of '
                 f'the ground beside the blocks, got {entries.support.model}'))
+        spread = entries.uncertainty
+        if entries.ground.probes and spread is not None and spread.rock_depth is not None:
+            raise self.faults.error('ground', 'probes', problem=(
+                'tell the motion of a half-space only, got uncertainty.rock_depth too, which puts '
+                'rock below it'))
         return tuple(GroundProbe(entry.name, entry.place.x, entry.place.y)
                      for entry in entries.ground.probes)
 
