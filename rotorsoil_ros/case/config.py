@@ -259,9 +259,7 @@ class _Builder:
         uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
         faults.tell()
         assert rotor is not None
-        assert foundations is not None
-        assert embedments is not None
-        assert probes is not None
+        assert foundations is not None and embedments is not None and probes is not None
         assert unbalance is not None
         assert speed_range is not None
         assert tables is not None
