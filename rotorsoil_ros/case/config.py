@@ -15,7 +15,7 @@ from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, message
 from rotorsoil_ros.case.entries.entry import faults
 from rotorsoil_ros.case.entries.ground import GroundEntries, THIN_LAYERS
-from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, GroundProbe, SiteEntries
+from rotorsoil_ros.case.entries.site import GroundProbe, SiteEntries
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
@@ -259,7 +259,9 @@ class _Builder:
         uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
         faults.tell()
         assert rotor is not None
-        assert foundations is not None and embedments is not None and probes is not None
+        assert foundations is not None
+        assert embedments is not None
+        assert probes is not None
         assert unbalance is not None
         assert speed_range is not None
         assert tables is not None
@@ -357,9 +359,7 @@ class _Builder:
                 with self.faults.at('foundations', index):
                     proportions(case.ground, foundation.contact, case.embedments[index],
                                 case.speed_range)
-        if case.support.model == BOUNDARY_ELEMENTS and case.soil is not None:
-            SiteEntries(self.faults).refuse_unreachable(
-                case.foundations, case.ground_probes, case.soil, case.speed_range)
+        SiteEntries(self.faults).refuse_unreachable(case)
         if case.support.model != 'infinite_elements' or case.soil is None:
             return
         geometry = case.support.geometry

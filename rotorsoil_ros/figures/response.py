@@ -322,7 +322,7 @@ def compliance_figure(
         axes.set_title(title, fontsize=8)
     for axes in grid[-1]:
         axes.set_xlabel('a0 [-]')
-    legend_below(figure, grid[0, 0], grid[0, 2])
+    legend_below(figure, grid[0, 0])
     length = 'r0' if isinstance(block.contact, Circle) else 'b'
     figure.suptitle(f'{name}: compliance of the soil below {block.name} over omega {length} / c_s;'
                     f' nu = {soil.poisson_ratio:g}, eta = {soil.loss_factor:g}', fontsize=9)

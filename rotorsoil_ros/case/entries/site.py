@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.errors import require, RotorSoilError
@@ -10,6 +11,9 @@ from rotorsoil_ros.ground.boundary.effort import highest_a0, HIGHEST_POISSON_RAT
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.foundation import Foundation
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.case.config import Case
 
 BOUNDARY_ELEMENTS = 'boundary_elements'
 
@@ -91,18 +95,17 @@ class SiteEntries:
         return tuple(GroundProbe(entry.name, entry.place.x, entry.place.y)
                      for entry in entries.ground.probes)
 
-    def refuse_unreachable(
-        self, foundations: Sequence[Foundation], probes: Sequence[GroundProbe], soil: Soil,
-        speed_range: tuple[float, float],
-    ) -> None:
+    def refuse_unreachable(self, case: 'Case') -> None:
         """Raise an InputError before boundary elements are built that nobody could solve."""
-        faults = self.faults
-        for index, block in enumerate(foundations):
+        faults, soil = self.faults, case.soil
+        if soil is None or case.support.model != BOUNDARY_ELEMENTS:
+            return
+        for index, block in enumerate(case.foundations):
             with faults.at('foundations', index):
                 site_of([block])
-        for index, probe in enumerate(probes):
+        for index, probe in enumerate(case.ground_probes):
             with faults.at('ground', 'probes', index):
-                site_of(foundations, [probe])
+                site_of(case.foundations, [probe])
         at_soil = soil.poisson_ratio > HIGHEST_POISSON_RATIO
         with faults.at('soil' if at_soil else 'speed_range_rpm', entry=faults.entries.soil):
-            site_reach(site_of(foundations, probes), soil, speed_range)
+            site_reach(site_of(case.foundations, case.ground_probes), soil, case.speed_range)
