@@ -5,6 +5,8 @@ import pty
 import subprocess
 import sys
 
+import pytest
+
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.cli import main
 
@@ -76,3 +78,22 @@ def test_dialogue_asks_again_and_takes_an_empty_answer_as_not_known(tmp_path):
     assert case.name == 'pump'
     assert case.rotor.shaft[0].outer_diameter == (0.06, 0.06)
     assert case.uncertainty.unbalance_factor == 1.0
+
+
+@pytest.mark.parametrize('given, kept', [(None, '1'), ('3', '3')])
+def test_verbs_ask_for_one_thread_unless_somebody_asked_for_more(given, kept, monkeypatch, capsys):
+    for library in ('OMP', 'OPENBLAS', 'MKL'):
+        name = f'{library}_NUM_THREADS'
+        monkeypatch.setenv(name, '')
+        if given is None:
+            monkeypatch.delenv(name)
+        else:
+            monkeypatch.setenv(name, given)
+    assert main(['new', '--questions']) == 0
+    assert {os.environ[f'{library}_NUM_THREADS'] for library in ('OMP', 'OPENBLAS', 'MKL')} == {
+        kept}
+
+
+def test_numpy_is_not_loaded_before_the_number_of_threads_is_known():
+    code = 'import sys; import rotorsoil_ros.cli; sys.exit("numpy" in sys.modules)'
+    assert subprocess.run([sys.executable, '-c', code], timeout=120, check=False).returncode == 0
