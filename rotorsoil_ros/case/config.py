@@ -125,8 +125,7 @@ class Case:
                        cache_directory=self.cache_directory)
 
 
-# What a machine may take: nodes of its mesh, and its response table.
-_MOST_NODES = 2000
+# What the response table of a machine may take.
 _GIB = 1 << 30
 _LARGEST_TABLE = 2 * _GIB
 
@@ -243,7 +242,8 @@ class _Builder:
         faults.attempt(on.refuse_unfit_support)
         speed_range = faults.attempt(self._speed_range)
         # A mesh that nobody could solve is not even built.
-        rotor = RotorEntries(faults).rotor() if faults.attempt(self._mesh) else None
+        of_rotor = RotorEntries(faults)
+        rotor = of_rotor.rotor() if faults.attempt(of_rotor.mesh) else None
         if rotor is not None:
             faults.attempt(lambda: self._refuse_bursting_speed(rotor))
         foundations, embedments = BlockEntries(faults).foundations(), on.embedments(ground)
@@ -289,16 +289,6 @@ class _Builder:
 
     def _journals(self) -> JournalEntries:
         return JournalEntries(self.faults, cache.directory(self.cache_directory))
-
-    def _mesh(self) -> int:
-        """Return the number of nodes, or raise an InputError if nobody could solve so many."""
-        rotor = self.faults.entries.rotor
-        nodes = 1 + sum(section.elements for section in rotor.shaft) + len(rotor.discs) + len(
-            rotor.bearings) + len(rotor.probes)
-        if nodes > _MOST_NODES:
-            raise self.faults.error('rotor', 'shaft', problem=(
-                f'must have at most {_MOST_NODES} nodes with all stations, got {nodes}'))
-        return nodes
 
     def _refuse_bursting_speed(self, rotor: Rotor) -> None:
         """Raise an InputError at a speed that no shaft of this diameter survives."""

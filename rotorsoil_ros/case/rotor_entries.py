@@ -31,12 +31,25 @@ from rotorsoil_ros.units import rpm_to_rad_s
 _INERTIAS = ('mass', 'diametral_inertia', 'polar_inertia')
 _DIMENSIONS = ('outer_diameter', 'inner_diameter', 'width', 'density')
 
+# More than anybody could solve.
+_MOST_SHAFT_NODES = 2000
+
 
 @dataclass(frozen=True)
 class RotorEntries:
     """Builds a rotor and says at which key it was refused."""
 
     faults: Faults
+
+    def mesh(self) -> int:
+        """Return the number of nodes, or raise an InputError if nobody could solve so many."""
+        rotor = self.faults.entries.rotor
+        nodes = 1 + sum(section.elements for section in rotor.shaft) + len(rotor.discs) + len(
+            rotor.bearings) + len(rotor.probes)
+        if nodes > _MOST_SHAFT_NODES:
+            raise self.faults.error('rotor', 'shaft', problem=(
+                f'must have at most {_MOST_SHAFT_NODES} nodes with all stations, got {nodes}'))
+        return nodes
 
     def rotor(self) -> Rotor | None:
         """Return shaft, discs, bearings and probes, or None where one is at fault."""
