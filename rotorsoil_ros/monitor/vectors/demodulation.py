@@ -11,7 +11,8 @@ from rotorsoil_ros.events import Demodulated, NANOSECONDS, Samples
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.orders import LARGEST_ACCELERATION, OrderVector, Turning
 from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
-from rotorsoil_ros.monitor.vectors.stretch import Finding, Stretch, TOLD
+from rotorsoil_ros.monitor.vectors.scatter import Scatter, WIDENED
+from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE, Finding, Stretch, TOLD
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
 MOST_SAMPLES = 1 << 16  # samples of a channel that wait for their speed
@@ -35,6 +36,7 @@ class Demodulator:
         self._done_ns = -1
         self.left_out = 0
         self.refusals = Refusals()
+        self._scatter = Scatter()
 
     def take(self, samples: Samples) -> None:
         """Keep samples; the oldest are left out if nobody tells the speed."""
@@ -102,11 +104,23 @@ class Demodulator:
             Flaw.TURNED, f'the orientation of the sensor turns its axes by '
                          f'{math.degrees(tilt):.0f} deg')
         self.refusals.left_out.update(finding.left_out)
+        if isinstance(found, OrderVector):
+            found = self._held_against_others(found)
         self.refusals.note(found if isinstance(found, Refusal) else None)
         if isinstance(found, Refusal):
             self.left_out += end
             return None, end
         return (zero_ns + round(found.time * NANOSECONDS), found), end
+
+    def _held_against_others(self, found: OrderVector) -> OrderVector | Refusal:
+        """Return a vector with what its neighbours say of its error, which may be all of it."""
+        vector = self._scatter.widened(found)
+        if vector is not found:
+            self.refusals.left_out[WIDENED] += 1
+            if abs(vector.displacement[0]) < ABOVE_NOISE * vector.deviation[0]:
+                return Refusal(Flaw.NOISE, 'below noise: vectors scatter by more than a third '
+                                           'of their size')
+        return vector
 
     def _event(self, found: Sequence[tuple[int, OrderVector]]) -> Demodulated:
         vectors = np.array([vector.displacement for _, vector in found])
