@@ -28,7 +28,7 @@ SENT_TYPES = {JOINT_STATE: JointState, FLOAT64: Float64, IMU: Imu}
 DEPTH = 1000
 NAP_S = 0.05  # how soon an interrupt or a new subscriber is noticed
 DELIVERY_S = 5.0
-SENSORS_S = 2.5
+SENSORS_SHARE = 0.25  # of the patience: of most sensors nobody wants to hear
 
 Progress = Callable[[int, int], None]
 
@@ -50,7 +50,8 @@ def replay(
     rate : float
         How many times faster than it was recorded.
     wait_s : float
-        How long to wait until every speed topic has a subscriber [s].
+        How long to wait until every speed topic has a subscriber, and a quarter of it for
+        those of sensors, which nobody may want to hear [s].
     context : Context
         Of an initialised rclpy; without one, replay brings its own up and down.
     progress : callable
@@ -171,7 +172,7 @@ class _Player:
                 raise RotorSoilError(f'nobody listens to {", ".join(deaf)} after {wait_s:g} s')
             time.sleep(NAP_S)
         # A node hears sensors a second after they have begun to publish.
-        until = time.monotonic() + SENSORS_S
+        until = time.monotonic() + SENSORS_SHARE * wait_s
         while time.monotonic() < until and self._context.ok() and not all(
                 publisher.get_subscription_count() for publisher in self._publishers.values()):
             time.sleep(NAP_S)

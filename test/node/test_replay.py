@@ -177,19 +177,22 @@ def test_a_bag_without_speed_is_refused(tmp_path):
         replay(tmp_path / 'p.mcap')
 
 
-def test_sensors_are_heard_from_their_first_sample_on(graph, tmp_path, cache):
+def test_sensors_are_heard_from_their_first_sample_on(graph, tmp_path, cache, monkeypatch):
+    # On a busy machine all of them may wait, for a long time: none may be lost for want of room.
+    monkeypatch.setattr('rotorsoil_ros.node.endpoint.RAW_DEPTH', 20_000)
+    monkeypatch.setattr('rotorsoil_ros.node.replay.DEPTH', 20_000)
     fan = Machine.load(FAN, cache_directory=cache)
     source = tmp_path / 'run.mcap'
     truth = Truth(ramp_s=2.0, dwell_s=1.0, slowest_rpm=900.0, rate_hz=400.0)
     write_synthetic(source, 'fan', fan.model, fan.case.unbalance, truth=truth, start_ns=START)
     parameters = {'cache': str(cache), 'machines': ['fan'], 'fan.case': str(FAN),
-                  'speed_reliability': 'reliable', 'speed_depth': 1000, 'log.rerun': False,
+                  'speed_reliability': 'reliable', 'speed_depth': 20_000, 'log.rerun': False,
                   'log.directory': str(tmp_path)}
     node = graph.add(RotorsoilNode(
         context=graph.context, parameter_overrides=[
             Parameter(name, value=value) for name, value in parameters.items()]))
     assert node.start()
-    replaying = InThread(replay, source, rate=4.0, context=graph.context)
+    replaying = InThread(replay, source, rate=4.0, wait_s=DEADLINE_S, context=graph.context)
     counts = node._watches[0].monitor.health.counts
     graph.until(lambda: replaying.is_done() and counts['samples'] == 8000, 'every sample')
     node.release()
