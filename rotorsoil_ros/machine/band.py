@@ -19,7 +19,7 @@ from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Soil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.pieces import refine, Solver
-from rotorsoil_ros.machine.response import Predictor, ResponseTable
+from rotorsoil_ros.machine.response import growth_of, Predictor, ResponseTable
 
 # A band of amplitudes need not be as sharp as a prediction.
 _TOLERANCE = 1e-3
@@ -145,7 +145,17 @@ class ResponseBand:
             table.channels, table.planes, table.transmits_force,
             refine(_solver(model), edges, groups=model.groups, tolerance=_TOLERANCE,
                    columns=len(model.planes)), _TOLERANCE,
-            table.stability) for model in models)), unbalance_factor)
+            growth_of(model, float(edges[-1]))) for model in models)), unbalance_factor)
+
+    @property
+    def unstable(self) -> str:
+        """How many of the other machines grow at some speed, in words; nothing where none does."""
+        others = self.tables[1:]
+        number = sum(bool(len(table.stability.unstable)) for table in others)
+        if not number:
+            return ''
+        return (f'{number} of the {len(others)} other machines that this one may be are unstable '
+                'at some speed: there the band holds the rest only')
 
     def envelope(self, unbalance: ComplexArray) -> Envelope:
         """
@@ -221,8 +231,9 @@ def _solver(model: CoupledModel) -> Solver:
 
 
 def _response(predictor: Predictor, speed: FloatArray) -> ComplexArray:
-    """Return displacement amplitudes, (n, c), NaN where the table does not cover a speed."""
-    return predictor.answer(speed).displacement
+    """Return displacement amplitudes, (n, c), NaN where there is no steady answer."""
+    holds = predictor.table.stability.holds(speed)
+    return np.where(holds[:, None], predictor.answer(speed).displacement, math.nan)
 
 
 def depends_on_soil(model: CoupledModel) -> bool:

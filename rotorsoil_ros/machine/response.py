@@ -118,7 +118,7 @@ class ResponseTable:
             return columns[:, :planes], columns[:, planes:]
 
         # Before the response: where a mode grows on its own there is none to be refined.
-        growth = _growth(model, high)
+        growth = growth_of(model, high)
         nothing = np.zeros((0, DEGREE + 1, planes, len(model.groups)), dtype=complex)
         parts = [Pieces(np.zeros(0), np.zeros(0, dtype=bool), nothing)]
         for left, right in _stable_ranges(growth, low, high):
@@ -210,7 +210,7 @@ class ResponseTable:
             float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])), key)
 
 
-def _growth(model: CoupledModel, high: float) -> Stability:
+def growth_of(model: CoupledModel, high: float) -> Stability:
     """Return where a mode grows, from rest to a speed; what cannot be told is a doubt."""
     try:
         return stability(model, (0.0, high))

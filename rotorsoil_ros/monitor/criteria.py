@@ -65,6 +65,8 @@ class Expectation:
         table = models.response_table(case, model, directory)
         band = models.response_band(case, model, table, directory, case.uncertainty)
         notes = list(unstable(table.stability))
+        if band is not None and band.unstable:
+            notes.append(band.unstable)
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
         span = model.within_tables((min(low, case.speed_range[0] or low), high))
         notes += clipped(span, (low, high))
@@ -110,7 +112,8 @@ class Expectation:
         found = Criteria(
             None if self.band is None else self.band.envelope(unbalance),
             tuple(self.resonances), (self.lowest_natural_speed('x'),
-                                     self.lowest_natural_speed('z')))
+                                     self.lowest_natural_speed('z')),
+            '' if self.band is None else self.band.unstable)
         Cache(self.directory).store(
             _KIND, criteria_key(self.case, self.model, unbalance), found.to_arrays())
         return found
@@ -121,7 +124,7 @@ def answer(predictor: Predictor, speed: FloatArray) -> ComplexArray:
     return predictor.answer(speed).displacement
 
 
-_KIND = 'criteria'
+_KIND, _FORM = 'criteria', 2  # of what is stored under the name
 _NICE = 19
 
 
@@ -138,12 +141,15 @@ class Criteria:
         Critical speeds, a little beyond the speed range.
     natural_speeds : tuple of two floats
         Lowest frequency of machine and support along x and along z [rad/s], inf where none.
+    note : str
+        What the band leaves out; empty where it holds all machines that this one may be.
 
     """
 
     envelope: Envelope | None
     resonances: tuple[Resonance, ...]
     natural_speeds: tuple[float, float]
+    note: str = ''
 
     def lowest_natural_speed(self, axis: str) -> float:
         """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
@@ -154,7 +160,7 @@ class Criteria:
         arrays = {
             'resonances': np.array([(resonance.speed, resonance.damping_ratio)
                                     for resonance in self.resonances]).reshape(-1, 2),
-            'natural_speeds': np.array(self.natural_speeds)}
+            'natural_speeds': np.array(self.natural_speeds), 'note': np.array(self.note)}
         if self.envelope is not None:
             band = self.envelope
             arrays |= {'speed': band.speed, 'low': band.low, 'high': band.high,
@@ -170,12 +176,12 @@ class Criteria:
                 'speed', 'low', 'high', 'behind', 'ahead')))
         x, z = arrays['natural_speeds'].tolist()
         return cls(envelope, tuple(Resonance(*row) for row in arrays['resonances'].tolist()),
-                   (x, z))
+                   (x, z), str(arrays['note']))
 
 
 def criteria_key(case: Case, model: CoupledModel, unbalance: ComplexArray) -> str:
     """Return what identifies the criteria of a case under an unbalance, (p,) [kg m]."""
-    return content_key(_KIND, models.response_key(case, model), case.uncertainty, unbalance)
+    return content_key(_KIND, _FORM, models.response_key(case, model), case.uncertainty, unbalance)
 
 
 def stored_criteria(

@@ -136,7 +136,10 @@ class Judge:
     def tick(self, now_ns: int, *, stale_after_s: float) -> Iterator[Event]:
         """Close the period since the last tick, and judge it."""
         while self._news:
-            yield Expected(self.machine, now_ns, self._news.pop(0).to_arrays())
+            criteria = self._news.pop(0)
+            yield Expected(self.machine, now_ns, criteria.to_arrays())
+            if criteria.note:
+                yield Remark(self.machine, now_ns, Level.WARN, criteria.note)
         for demodulator in self._demodulators.values():
             for found in demodulator.vectors():
                 yield found

@@ -1,5 +1,6 @@
 """The soil band against solving the machine on every soil."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -61,6 +62,25 @@ def test_given_soil_lies_in_its_band(models, envelope):
     found = envelope.at(speed)
     assert np.all(np.abs(exact)[:, moving] >= slack[0] * found.low[:, moving])
     assert np.all(np.abs(exact)[:, moving] <= slack[1] * found.high[:, moving])
+
+
+def test_a_machine_that_grows_is_in_no_band_and_is_told(models):
+    table = ResponseTable.build(models[0], RANGE)
+    plain = ResponseBand.build(table, models[1:3])
+    rotor = models[1].rotor
+    skew = np.array([[0.0, 5e7], [-5e7, 0.0]])  # a film that whirls
+    growing = replace(models[1], rotor=replace(rotor, bearings=tuple(
+        replace(bearing, stiffness=bearing.stiffness + skew) for bearing in rotor.bearings)))
+    both = ResponseBand.build(table, [*models[1:3], growing])
+    assert plain.unstable == ''
+    assert both.unstable.startswith('1 of the 3 other machines')
+    speed = np.linspace(*RANGE, 200)
+    with_it, without = (band.envelope(UNBALANCE).at(speed) for band in (both, plain))
+    grows = ~both.tables[-1].stability.holds(speed)
+    assert grows.any()
+    for edge in ('low', 'high'):
+        np.testing.assert_allclose(getattr(with_it, edge)[grows], getattr(without, edge)[grows],
+                                   rtol=0.05)
 
 
 def sharp_machine(soil=SOIL):

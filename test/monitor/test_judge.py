@@ -414,6 +414,14 @@ def test_an_alarm_is_a_quarter_of_the_boundary_above_the_baseline(
     assert told.values[f'{X}_trip_mm_s_rms'] == pytest.approx(5.0)
 
 
+def test_what_the_band_leaves_out_is_told_once(fan, basis):
+    run = Run(fan, replace(basis, note='2 of the 5 other machines are unstable'))
+    for second in range(1, 4):
+        run.ticks(second)
+    assert [(event.level, event.text) for event in run.of(Remark)] == [
+        (Level.WARN, '2 of the 5 other machines are unstable')]
+
+
 def test_value_on_a_boundary_does_not_chatter(zoned):
     # A second is judged when the next one has begun.
     dwell(zoned, [1.9e-3, 2.01e-3, 1.99e-3, 2.01e-3, 1.95e-3, 2.02e-3, 2.02e-3, 2.02e-3])
