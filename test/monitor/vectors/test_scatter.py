@@ -5,10 +5,9 @@ import pytest
 
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Samples
-from rotorsoil_ros.monitor.vectors.demodulation import Demodulator
+from rotorsoil_ros.monitor.vectors.demodulation import Demodulator, Scatter, WIDENED
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.orders import OrderVector
-from rotorsoil_ros.monitor.vectors.scatter import Scatter, WIDENED
 
 X = Channel('fan_end', 'housing', 'x')
 
