@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import FloatArray, prominent_peaks
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, prominent_peaks
 from rotorsoil_ros.channel import ACROSS, HOUSING
+from rotorsoil_ros.errors import OutOfTableError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.critical import CriticalSpeed
 from rotorsoil_ros.machine.response import Predictor
@@ -27,6 +28,8 @@ _SAME_RESONANCE = 0.055
 # A peak is looked at so many damping ratios to both sides, at so many speeds.
 _WIDTHS = 10.0
 _RESPONSE_POINTS = 2001
+# Share of a speed about which something has to be known.
+_LEAST_REACH = 1e-3
 _HALF_POWER = 0.5**0.5
 
 
@@ -117,8 +120,6 @@ def _half_power_factor(
     if critical.damping_ratio <= 0.0 or not rows:
         return math.nan
     reach = min(0.9, max(_WIDTHS * critical.damping_ratio, 1e-9))
-    speed = np.linspace(*model.within_tables(
-        ((1.0 - reach) * critical.speed, (1.0 + reach) * critical.speed)), _RESPONSE_POINTS)
     # Of a forward orbit x = -i z: its part of the shape, at the discs, turned into phase.
     forward = 0.5 * (critical.deflection[:, 1] + 1j * critical.deflection[:, 0])
     excites = np.zeros(len(model.planes), dtype=complex)
@@ -127,7 +128,8 @@ def _half_power_factor(
     shaft = [index for index, channel in enumerate(model.channels)
              if channel.axis in ACROSS and channel.part != HOUSING
              and channel.station not in blocks]
-    size = np.abs(model.unbalance_response(speed, excites).displacement[:, shaft])
+    speed, size = _about(model, critical.speed, reach, excites)
+    size = size[:, shaft]
     size = size[:, size[np.abs(speed - critical.speed).argmin()].argmax()]
     inner = 1 + np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] > size[2:]))
     # A peak is where its mode is, within its bandwidth, and no other mode is nearer.
@@ -137,6 +139,21 @@ def _half_power_factor(
     if not own:
         return math.nan
     return _sharpness(speed, size, min(own, key=lambda top: abs(critical.speed - speed[top])))
+
+
+def _about(
+    model: CoupledModel, middle: float, reach: float, excites: ComplexArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return speeds [rad/s] and answers about a middle, as far as bearings and ground go."""
+    while True:
+        speed = np.linspace(*model.within_tables(((1.0 - reach) * middle, (1.0 + reach) * middle)),
+                            _RESPONSE_POINTS)
+        try:
+            return speed, np.abs(model.unbalance_response(speed, excites).displacement)
+        except OutOfTableError:
+            if reach < _LEAST_REACH:
+                raise
+            reach *= 0.8
 
 
 def _sharpness(speed: FloatArray, size: FloatArray, top: int) -> float:

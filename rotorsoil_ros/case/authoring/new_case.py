@@ -6,10 +6,9 @@ from pathlib import Path
 from rotorsoil_ros.case import config, document
 from rotorsoil_ros.case.authoring.estimates import cylinder, Estimates, Known
 from rotorsoil_ros.case.authoring.questions import Answers
-from rotorsoil_ros.errors import RotorSoilError
-from rotorsoil_ros.ground.soil import Rectangle, Soil
+from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.soil import Rectangle
 from rotorsoil_ros.machine.foundation import solid_inertia
-from rotorsoil_ros.units import rpm_to_rad_s
 
 MARK = '# guess'
 
@@ -17,6 +16,8 @@ MARK = '# guess'
 _LOWEST, _HIGHEST, _ELEMENTS = 0.2, 1.3, 12
 # On oil films: below, they are thinner than any that carries.
 _LOWEST_ON_FILMS = 0.5
+# Models of the ground, the best first: the first that reaches the speeds is taken.
+_MODELS = ('boundary_elements', 'infinite_elements', 'cone')
 # ISO 10816-3: group 1 above this power [kW].
 _LARGE = 300.0
 _COMMENT_COLUMN = 46
@@ -47,12 +48,19 @@ def text_of(answers: Answers, *, command: str) -> str:
         f'# What ends in "{MARK}" nobody told: replace it by what you know, and take its line out',
         '# of `uncertainty`, which says how far each guess may be off. Axes: x across, y along',
         '# the shaft, z up. SI units; "140 mm" or "100 MPa" may be written too.']
-    body = [f'name: {name}', *_ground(found), *_foundation(found), *_rotor(found),
-            *_unbalance(found), *_spread(found), *_limits(found)]
-    text = '\n'.join([*head, *body]) + '\n'
-    # What is written has to load.
-    config.case_of(Path(name), document.parse(text, source=name))
-    return text
+    refusal: InputError | None = None
+    for model in _MODELS:
+        body = [f'name: {name}', *_ground(found, model), *_foundation(found), *_rotor(found),
+                *_unbalance(found), *_spread(found), *_limits(found)]
+        text = '\n'.join([*head, *body]) + '\n'
+        try:  # what is written has to load
+            config.case_of(Path(name), document.parse(text, source=name))
+        except InputError as error:
+            refusal = refusal or error
+        else:
+            return text
+    assert refusal is not None
+    raise refusal
 
 
 def _line(text: str, comment: str) -> str:
@@ -81,7 +89,7 @@ def _flow(values: Mapping[str, float]) -> str:
     return '{' + ', '.join(f'{key}: {_number(value)}' for key, value in values.items()) + '}'
 
 
-def _ground(found: Estimates) -> Iterator[str]:
+def _ground(found: Estimates, model: str) -> Iterator[str]:
     soil, means = found.soil_class, found.soil_class.means
     yield 'soil:'
     yield _line(f'  shear_wave_velocity: {_number(found.wave_velocity)}',
@@ -94,25 +102,7 @@ def _ground(found: Estimates) -> Iterator[str]:
     low, high = soil.damping_ratio
     yield _line(f'  loss_factor: {low + high:.4g}',
                 f'{MARK}: twice a damping ratio of {low:g} to {high:g}')
-    yield f'support: {{model: {_support(found)}}}'
-
-
-def _support(found: Estimates) -> str:
-    """Return which model of the ground reaches the speeds of the machine."""
-    width, length, _ = found.block
-    density = found.soil_density.value
-    soil = Soil(density * found.wave_velocity.value**2, 0.3, density)
-    try:
-        config.infinite_range(soil, Rectangle(0.5 * width.value, 0.5 * length.value), 'disc',
-                              _speeds(found))
-    except RotorSoilError:
-        return 'cone'
-    return 'infinite_elements'
-
-
-def _speeds(found: Estimates) -> tuple[float, float]:
-    low, high = _speeds_rpm(found)
-    return float(rpm_to_rad_s(low)), float(rpm_to_rad_s(high))
+    yield f'support: {{model: {model}}}'
 
 
 def _speeds_rpm(found: Estimates) -> tuple[float, float]:
