@@ -12,7 +12,12 @@ import numpy as np
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
-from rotorsoil_ros.case.design.tables import boundary_element_model, infinite_element_model
+from rotorsoil_ros.case.design.tables import (
+    boundary_element_model,
+    infinite_element_model,
+    thin_layer_model,
+)
+from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.summary import undecided
 from rotorsoil_ros.cli.progress import progress
@@ -26,8 +31,11 @@ from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigur
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.layers.model import ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import LayeredSoil, SURFACE
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.response import ResponseTable
 
 if TYPE_CHECKING:
@@ -78,9 +86,13 @@ def _soil_figures(
 ) -> Iterator[tuple[str, 'Figure']]:
     """Yield all models of the soil below each block, where the case has a soil."""
     if case.soil is None or case.support.model not in (
-            'cone', 'infinite_elements', BOUNDARY_ELEMENTS):
+            'cone', 'infinite_elements', BOUNDARY_ELEMENTS, THIN_LAYERS):
         return
     for index, block in enumerate(model.foundations):
+        own = model.soil_models[index] if case.support.model == THIN_LAYERS else None
+        if isinstance(own, ThinLayerModel):
+            yield f'compliance_{block.name}', _layers_figure(case, block, own, directory)
+            continue
         known: dict[str, SoilModel] = {'cone': ConeModel(case.soil, block.contact)}
         spans = []
         for label, solved in (('infinite elements', _infinite), ('boundary elements', _boundary)):
@@ -97,6 +109,19 @@ def _soil_figures(
                                 _POINTS)
             yield f'compliance_{block.name}', compliance_figure(
                 case.name, block, case.soil, known, omega)
+
+
+def _layers_figure(
+    case: Case, block: Foundation, layers: ThinLayerModel, directory: Path,
+) -> 'Figure':
+    """Return the compliance of layered ground beside that of a half-space without any layer."""
+    assert case.soil is not None
+    even = thin_layer_model(LayeredSoil((), case.soil), block.contact, SURFACE,
+                            cache=cache.Cache(directory), speed_range=case.speed_range)
+    omega = np.linspace(0.0, min(even.omega_range[1], layers.omega_range[1]), _POINTS)
+    return compliance_figure(
+        case.name, block, case.soil,
+        {'on the surface, no layers': even, 'as given': layers}, omega)
 
 
 def _infinite(

@@ -1,6 +1,6 @@
 """What a case answers, as figures for print: every axis has its unit."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import ACROSS, across, Channel, DOFS, HOUSING, JOURNAL
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.figures.drawing import machine_drawing
-from rotorsoil_ros.ground.soil import Circle, Soil, SoilModel
+from rotorsoil_ros.ground.soil import Circle, singular_of, Soil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
@@ -322,11 +322,24 @@ def compliance_figure(
         axes.set_title(title, fontsize=8)
     for axes in grid[-1]:
         axes.set_xlabel('a0 [-]')
+    _mark_cut_offs(grid, models.values(), scale, omega)
     legend_below(figure, grid[0, 0])
     length = 'r0' if isinstance(block.contact, Circle) else 'b'
     figure.suptitle(f'{name}: compliance of the soil below {block.name} over omega {length} / c_s;'
                     f' nu = {soil.poisson_ratio:g}, eta = {soil.loss_factor:g}', fontsize=9)
     return figure
+
+
+def _mark_cut_offs(
+    grid: np.ndarray, models: Iterable[SoilModel], scale: float, omega: FloatArray,
+) -> None:
+    """Draw a line wherever a wave of the layers begins to travel."""
+    for model in models:
+        for place in singular_of(model).tolist():
+            if omega[0] < place < omega[-1]:
+                for axes in grid.ravel():
+                    axes.axvline(place * scale, color='grey', linewidth=0.6, linestyle=':',
+                                 zorder=0)
 
 
 def _draw_dof(row: np.ndarray, a0: FloatArray, values: Mapping[str, ComplexArray]) -> None:

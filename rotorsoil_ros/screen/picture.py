@@ -14,6 +14,7 @@ from rotorsoil_ros.units import rad_s_to_rpm
 FRAME_NS = NANOSECONDS // 10
 TURN_NS = 4 * NANOSECONDS  # a drawn turn of the shaft; the real one could not be followed
 STEEL, GOLD, CONCRETE, EDGE = (70, 130, 180), (230, 160, 30), (150, 150, 145), (60, 60, 60)
+EARTH = (160, 120, 70)
 MOVING = 'moving'
 SHAFT_RADIUS = rr.Radius.ui_points(3.0)
 ORBIT_RADIUS = rr.Radius.ui_points(1.5)
@@ -112,6 +113,9 @@ class Picture:
             centre, seats = (0.0, 0.0, 0.5 * block.height), np.array(block.seats) - block.centre_y
             # What is static hides what moves: the block stands here and moves one level below.
             log(block.name, rr.Transform3D(translation=(0.0, block.centre_y, 0.0)))
+            if block.hole:
+                log(f'{block.name}/ground', rr.LineStrips3D(
+                    block.hole, colors=EARTH, radii=EDGE_RADIUS))
             log(f'{block.name}/{MOVING}/body', rr.Boxes3D(
                 sizes=[size], centers=[centre], colors=CONCRETE, fill_mode='solid'))
             log(f'{block.name}/{MOVING}/edges', rr.Boxes3D(

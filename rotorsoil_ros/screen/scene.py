@@ -1,7 +1,7 @@
 """What does the machine look like while it vibrates? Its geometry, and how far it bends."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -18,6 +18,7 @@ SHAFT_POINTS = 61
 ORBIT_POINTS = 33
 LARGEST_SHARE = 0.15  # of the shaft length, that the largest drawn displacement may take
 SMALLEST_SHARE = 0.05  # below it the scale is chosen anew
+_HOLE = 1.08  # of a block, how wide the hole is drawn that it stands in
 BLOCK_SHARE = 0.45  # of the shaft height, that a block takes whose height is not known
 
 
@@ -49,7 +50,8 @@ class Block:
     """
     A drawn foundation: half-sizes, height, centre and bearing seats [m], its six channels.
 
-    It is schematic where its case does not tell its height.
+    It is schematic where its case does not tell its height. `embedment` is how deep its base lies
+    below the surface [m].
     """
 
     name: str
@@ -60,6 +62,19 @@ class Block:
     seats: tuple[float, ...]
     channels: tuple[int, ...]
     is_schematic: bool
+    embedment: float = 0.0
+
+    @property
+    def hole(self) -> list[list[tuple[float, float, float]]]:
+        """Lines of the hole that it stands in, about the centre of its contact: empty if none."""
+        if not self.embedment:
+            return []
+        corners = [(x * self.half_width, y * self.half_length)
+                   for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+        rim = [(_HOLE * x, _HOLE * y, self.embedment) for x, y in corners]
+        # The edge of the ground, and from each corner of it down to the base.
+        return [rim, *([edge, (x, y, 0.0)] for edge, (x, y) in zip(rim[:4], corners[:4],
+                                                                 strict=True))]
 
 
 class Scene:
@@ -83,7 +98,9 @@ class Scene:
         self.shaft_height = rotor.shaft_height
         self.length = sum(section.length for section in rotor.shaft)
         blocks = {foundation.name for foundation in case.foundations}
-        self.blocks = [_block(foundation, case, index) for foundation in case.foundations]
+        self.blocks = [
+            replace(_block(foundation, case, index), embedment=embedment.depth)
+            for foundation, embedment in zip(case.foundations, case.embedments, strict=True)]
         self.ground_seats = tuple(bearing.position for bearing in rotor.bearings
                                   if bearing.foundation not in blocks)
         self.y = np.linspace(0.0, self.length, SHAFT_POINTS)

@@ -15,13 +15,18 @@ from rotorsoil_ros.cli import main
 from rotorsoil_ros.figures.comparison import ZONE_COLOURS
 from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.figures.modal import modal_figures
-from rotorsoil_ros.figures.response import all_figures, COLOURS, trend
+from rotorsoil_ros.figures.response import all_figures, COLOURS, compliance_figure, trend
+from rotorsoil_ros.ground.layers.model import ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import Layer, LayeredSoil
+from rotorsoil_ros.ground.soil import Circle, Soil
+from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 
 CONFIG = Path(__file__).parents[2] / 'config'
 FAN = CONFIG / 'plant_fan.yaml'
+SAND = Soil(60e6, 0.3, 1900.0, 0.05)
 
 
 @pytest.fixture(scope='module')
@@ -91,6 +96,19 @@ def test_layers_rock_and_the_gap_beside_a_block_are_drawn_to_scale():
     # Of the contact at 0: the layer from the surface to the rock, and the free part of the wall.
     assert {(-0.7, 0.8), (0.2, 0.8)} <= spans
     assert {text.get_text() for text in side.texts} >= {'rigid rock', 'c_s = 229 m/s'}
+
+
+def test_cut_offs_are_marked_in_the_compliance():
+    layers = ThinLayerModel.solved(
+        LayeredSoil((Layer(3.0, SAND),), None), Circle(1.0), omega_max=250.0)
+    block = Foundation('block', Circle(1.0), 0.0, 1e4, 0.5, (1e4, 1e4, 1e4))
+    figure = compliance_figure('a', block, SAND, {'same': layers, 'given': layers},
+                               np.linspace(0.0, 250.0, 40))
+    marks = {float(line.get_xdata()[0]) for line in figure.axes[0].get_lines()
+             if line.get_linestyle() == ':'}
+    expected = layers.singular[layers.singular < 250.0] / SAND.shear_wave_speed
+    assert len(expected) >= 2
+    np.testing.assert_allclose(sorted(marks), expected)
 
 
 def test_still_directions_of_a_rigid_base_are_not_drawn(tmp_path):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from rotorsoil_ros.ground.layers.profile import Embedment
 from rotorsoil_ros.screen.scene import round_scale, Scene
 
 
@@ -94,3 +95,15 @@ def test_a_block_is_as_high_as_its_case_says(machine):
     assert (drawn.height, drawn.is_schematic) == (0.3, False)
     [unknown] = Scene(machine.case, machine.table.channels).blocks
     assert unknown.is_schematic
+
+
+def test_a_block_stands_in_its_hole(machine):
+    case = replace(machine.case, embedments=(Embedment(0.25),))
+    [block] = Scene(case, machine.table.channels).blocks
+    rim, *edges = block.hole
+    assert {point[2] for point in rim} == {0.25}
+    assert min(abs(x) for x, _, _ in rim) > block.half_width
+    # From the edge of the ground down to each corner of the base.
+    assert [edge[1][2] for edge in edges] == [0.0] * 4
+    [on_surface] = Scene(machine.case, machine.table.channels).blocks
+    assert on_surface.hole == []
