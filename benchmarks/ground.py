@@ -5,9 +5,10 @@ Tabulates eight grounds under a disc of radius one up to a0 = 6, each in a proce
 prints CPU seconds of one core, pieces, exact solves, nodes, milliseconds per solve, the share of
 each step, the error that the table states, that at unseen frequencies against a finer mesh, and
 the largest memory of the process. `--rock` tells instead what rock that moves leaves of the peaks
-of a layer on rigid rock, `--mesh` how the elements along the depth converge.
+of a layer on rigid rock, `--mesh` how the elements along the depth converge, and `--cones` how
+much damping cones have over that of buried discs and of layers.
 
-    python -m benchmarks.ground [--rock | --mesh]
+    python -m benchmarks.ground [--rock | --mesh | --cones]
 """
 
 import os
@@ -52,13 +53,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--rock', action='store_true')
     parser.add_argument('--mesh', action='store_true')
+    parser.add_argument('--cones', action='store_true')
     arguments = parser.parse_args()
-    if arguments.rock:
-        compare_rock()
-        return
-    if arguments.mesh:
-        compare_meshes()
-        return
+    for wanted, compare in ((arguments.rock, compare_rock), (arguments.mesh, compare_meshes),
+                            (arguments.cones, compare_cones)):
+        if wanted:
+            compare()
+            return
     for name in GROUNDS:
         # A fresh process: nothing is warm, and its peak memory is its own.
         process = multiprocessing.get_context('spawn').Process(target=measure, args=(name,))
@@ -165,6 +166,27 @@ def compare_meshes() -> None:
                 errors.append(f'{(np.abs(found - finest) / entry_scale(finest)).max():.1e}')
             print(f'{name}, order {order}: smallest element 0.016, 0.008, 0.004 radii: '
                   + ', '.join(errors))
+
+
+def compare_cones() -> None:
+    """Print the damping of cones over that of discs at the surface, buried, and on layers."""
+    from rotorsoil_ros.ground.cone import ConeModel
+    from rotorsoil_ros.ground.layers.model import ThinLayerModel
+    from rotorsoil_ros.ground.layers.profile import Embedment, Layer, LayeredSoil
+    from rotorsoil_ros.ground.soil import Circle, Soil
+
+    soil, disc, a0 = Soil(1.0, 0.25, 1.0, 0.05), Circle(1.0), np.array([0.5, 1.0, 2.0])
+    even, on_rock = LayeredSoil((), soil), LayeredSoil((Layer(2.0, soil),), None)
+    cone = np.linalg.inv(ConeModel(soil, disc).compliance(a0)).imag
+    for name, ground, depth in (
+            ('on the surface', even, 0.0), ('buried 0.5 radii', even, 0.5),
+            ('buried 1 radius', even, 1.0), ('on a layer of 2 radii on rock', on_rock, 0.0)):
+        model = ThinLayerModel.solved(ground, disc, omega_max=2.0, embedment=Embedment(depth))
+        exact = np.linalg.inv(model.compliance(a0)).imag
+        told = ', '.join(
+            f'{motion} ' + ' '.join(f'{one:.2f}' for one in cone[:, dof, dof] / exact[:, dof, dof])
+            for motion, dof in (('sliding', 0), ('vertical', 2), ('rocking', 4), ('torsion', 5)))
+        print(f'damping of cones over that of a disc {name}, a0 = 0.5 1 2: {told}')
 
 
 if __name__ == '__main__':
