@@ -29,7 +29,7 @@ setup(
         (f'share/{NAME}/config', sorted(glob('config/*.yaml'))),
         (f'share/{NAME}/config/library', sorted(glob('config/library/*.yaml'))),
         (f'share/{NAME}/layouts', sorted(glob('layouts/*'))),
-        (f'share/{NAME}/launch', sorted(glob('launch/*.py') + glob('launch/*.yaml'))),
+        (f'share/{NAME}/launch', sorted(glob('launch/*.*'))),
     ],
     zip_safe=False,
     install_requires=[

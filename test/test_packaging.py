@@ -1,5 +1,6 @@
 """The package as colcon and pip see it."""
 
+import configparser
 from importlib.resources import files
 import os
 from pathlib import Path
@@ -17,6 +18,7 @@ import setuptools
 import yaml
 
 import rotorsoil_ros
+from rotorsoil_ros.errors import BAD_INPUT
 
 ROOT = Path(__file__).parents[1]
 CASES = sorted((ROOT / 'config').glob('*.yaml'))
@@ -94,7 +96,8 @@ def test_data_files_exist_and_hold_every_case(arguments):
         path.name for path in CASES]
     assert [Path(name).name for name in installed['share/rotorsoil_ros/config/library']] == [
         path.name for path in LIBRARY]
-    assert installed['share/rotorsoil_ros/launch']
+    assert [Path(name).suffix for name in installed['share/rotorsoil_ros/launch']] == [
+        '.py', '.service', '.yaml']
     for sources in installed.values():
         assert all((ROOT / source).is_file() for source in sources)
 
@@ -251,3 +254,15 @@ def test_changelog_is_one_for_this_package():
     lines = (ROOT / 'CHANGELOG.rst').read_text().splitlines()
     assert lines[1] == 'Changelog for package rotorsoil_ros'
     assert len(lines[0]) == len(lines[2]) == len(lines[1])
+
+
+def test_systemd_unit_starts_what_is_installed_and_knows_its_exit_status(arguments):
+    unit = configparser.ConfigParser(interpolation=None)
+    unit.optionxform = str
+    unit.read('launch/rotorsoil.service')
+    service = unit['Service']
+    program = Path(service['ExecStart'].split()[0]).name
+    scripts = [entry.split(' = ')[0] for entry in arguments['entry_points']['console_scripts']]
+    assert program in scripts
+    assert int(service['RestartPreventExitStatus']) == BAD_INPUT
+    assert service['Restart'] == 'on-failure'
