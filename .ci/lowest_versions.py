@@ -16,7 +16,8 @@ def bounds() -> list[str]:
     setuptools.setup = lambda **given: caught.update(given)
     runpy.run_path('setup.py')
     extras = caught['extras_require']
-    wanted = [*caught['install_requires'], *extras['ros'], *extras['frames']]
+    wanted = [*caught['install_requires'], *(
+        bound for name in ('ros', 'frames', 'tables', 'bags') for bound in extras[name])]
     return sorted({f'{name}=={version}' for name, version in re.findall(
         r'^([\w-]+)(?:\[\w+\])?>=([\w.]+)', '\n'.join(wanted), re.MULTILINE)})
 

@@ -23,10 +23,13 @@ from rotorsoil_ros.node.replay import replay
 from rotorsoil_ros.testing.graph import DEADLINE_S
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
+from rotorsoil_ros.wire.sensors import JointStateReader
+from rotorsoil_ros.wire.speeds import SpeedSource
 
 from records import topics_of
 
 FAN = Path('config/plant_fan.yaml')
+RPM = Path(__file__).parents[1] / 'cases' / 'speed_in_another_type' / 'rpm_int32.mcap'
 START = 1_700_000_000_000_000_001
 ANSWERS = ('/rotorsoil/fan/amplitude', '/rotorsoil/fan/phase')
 MEASURED = '/fan/measured/amplitude'
@@ -106,6 +109,28 @@ def test_live_replayed_and_offline_are_the_same_to_the_bit(
                 assert time_ns == stamp.sec * 10**9 + stamp.nanosec
                 stamps[connection.topic].append(time_ns)
     assert len(set(map(tuple, stamps.values()))) == 1  # every stamp of the input, nothing else
+
+
+def test_a_speed_that_is_told_in_another_way_reaches_a_node_that_knows_of_nothing(
+        rotorsoil_twin, machine, case_file, cache, tmp_path):
+    rpm = SpeedSource(topic='/paper_rotor/rpm', unit='rpm')
+    twin = rotorsoil_twin(case_file, machine='fan', parameters={'cache': str(cache)})
+    played = InThread(replay, RPM, rate=100.0, context=twin.context, speed=rpm, machine='fan')
+    twin.until(played.is_done, 'the replay')
+    assert (played.error, played.result) == (None, 200)
+    predict(machine, RPM, tmp_path / 'offline.mcap', speed=rpm)
+    states = JointStateReader()
+    [(_, exact)] = states.runs(payloads(tmp_path / 'offline.mcap',
+                                        '/rotorsoil/paper_rotor/amplitude'))
+    answers = twin.amplitude.wait_for(200)
+    assert [answer.stamp_ns for answer in answers] == exact.stamp_ns.tolist()
+    np.testing.assert_array_equal([answer['disc_1_x'] for answer in answers],
+                                  exact.position[:, exact.names.index('disc_1_x')])
+
+
+def test_whose_speed_a_topic_tells_has_to_be_known(tmp_path):
+    with pytest.raises(InputError, match='no topic says whose speed it is; name the machine'):
+        replay(RPM, speed=SpeedSource(topic='/paper_rotor/rpm', unit='rpm'))
 
 
 class Clock:

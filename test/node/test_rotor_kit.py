@@ -1,11 +1,9 @@
 """A measured run-up of a real rotor, answered offline and live."""
 
 from pathlib import Path
-from threading import Thread
 
 import numpy as np
 import pytest
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
@@ -13,8 +11,6 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import speed_profile
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.node.node import RotorsoilNode
-from rotorsoil_ros.node.replay import replay
 
 from records import import_run_up
 
@@ -46,27 +42,20 @@ def test_run_up_takes_as_long_as_its_turns(run_up):
 
 
 def test_live_answers_to_the_measured_run_up_are_those_of_offline(
-        graph, cache, run_up, tmp_path):
+        rotorsoil_twin, cache, run_up, tmp_path):
     machine = Machine.load(CASE, cache_directory=cache)
     offline = tmp_path / 'offline.mcap'
     counts = predict(machine, run_up, offline).counts
     assert counts['answered'] == ROWS
 
-    values = {'machines': ['rk4_rotor_kit'], 'rk4_rotor_kit.case': str(CASE),
-              'cache': str(cache), 'log.directory': str(tmp_path / 'logs'), 'log.rerun': False,
-              'speed_depth': 1000, 'speed_reliability': 'reliable'}
-    node = graph.add(RotorsoilNode(context=graph.context, parameter_overrides=[
-        Parameter(name, value=value) for name, value in values.items()]))
-    assert node.start()
+    twin = rotorsoil_twin(CASE, parameters={
+        'cache': str(cache), 'log.directory': str(tmp_path / 'logs')})
     heard = {topic: [] for topic in ANSWERS}
     for topic, messages in heard.items():
-        graph.probe.create_subscription(
+        twin.graph.probe.create_subscription(
             JointState, topic, messages.append, QoSProfile(depth=1000), raw=True)
-    player = Thread(target=replay, args=(run_up,), kwargs={'rate': 20.0,
-                                                           'context': graph.context})
-    player.start()
-    graph.until(lambda: not player.is_alive()
-                and all(len(messages) == ROWS for messages in heard.values()), 'every answer')
-    node.release()
+    assert twin.replay(run_up, rate=20.0) == 3 * ROWS  # speeds, amplitudes, phases
+    twin.until(lambda: all(len(messages) == ROWS for messages in heard.values()), 'every answer')
+    twin.release()
     for topic, messages in heard.items():
         assert [bytes(message) for message in messages] == payloads(offline, topic)
