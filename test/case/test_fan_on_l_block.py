@@ -205,6 +205,7 @@ def test_compliance_of_a_block_shows_who_moves_it(cache, capsys):
         np.testing.assert_allclose(found, exact[:, row, column], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_check_tells_coupling_and_probes(cache, capsys):
     assert main(['check', str(ELL), '--cache', str(cache)]) == 0
     said = capsys.readouterr().out
