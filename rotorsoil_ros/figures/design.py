@@ -122,9 +122,7 @@ def _modes(report: DesignReport) -> str:
         [[one.name, f'{one.critical.speed_rpm:.0f}', f'{one.critical.damping_ratio:.1%}',
           '-' if one.split is None else one.split.words(0).split(',')[0],
           f'{one.margin:.0%}', f'{one.required:.0%}' if one.required else 'none',
-          'too near' if one.is_missed else 'kept'] for one in nearest]) + ''.join(
-        f'<p class="small">{escape(one.name)} is damped by {escape(one.split.words(0))}.</p>'
-        for one in nearest[:1] if one.split is not None)
+          'too near' if one.is_missed else 'kept'] for one in nearest])
 
 
 def _stability(report: DesignReport) -> str:
@@ -169,7 +167,9 @@ def _given(report: DesignReport) -> Iterator[str]:
                f'{mark(f"{place}.mass")}')
     rotor = case.rotor
     diameter = max(max(section.outer_diameter) for section in rotor.shaft)
-    yield f'rotor: {rotor.mass:.4g} kg{mark("rotor.discs")}'
+    # Of a rotor that was weighed only its parts are guesses.
+    known = case.uncertainty.rotor_mass_factor == 1.0
+    yield f'rotor: {rotor.mass:.4g} kg{"" if known else mark("rotor.discs")}'
     yield f'shaft: up to {1e3 * diameter:.4g} mm{mark("rotor.shaft")}'
     springs = ', '.join(f'{one.nominal_stiffness:.2g}' for one in rotor.bearings[:4])
     yield f'bearings: {springs} N/m{mark("rotor.bearings")}'
