@@ -20,6 +20,7 @@ COUNTED = ('received', 'answered', STANDING, *FAULTS, 'joint_missing', *REDATED,
 
 MOST_SAID = 16
 EXPLAINED = {
+    'negative': 'the speed is negative: of a drive that counts backwards the ratio is -1',
     'stamp_not_set': 'header.stamp is zero: whoever sends the speed does not set it',
     'stamp_far_off': 'header.stamp jumps by years: the clock of whoever sends is not set'}
 
