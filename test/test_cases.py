@@ -75,8 +75,8 @@ def test_what_cannot_be_read_is_refused_by_its_topic_and_nothing_is_sent(predict
 
 @pytest.mark.parametrize('log, words', [
     ('othername', '200 joint missing (needed is rotor, there are fan_motor_joint)'),
-    ('reversed', 'nothing is answered: 200 negative (the speed is negative: of a drive that counts '
-                 'backwards the ratio is -1)')])
+    ('reversed', 'nothing is answered: 200 negative (the speed is negative: of a drive that '
+                 'counts backwards the ratio is -1)')])
 def test_nothing_answered_is_a_failure_with_its_reason(predicted, log, words):
     status, said, times = predicted(CASES / 'joint_of_another_name' / f'{log}.mcap')
     assert (status, times) == (1, [])
