@@ -240,6 +240,7 @@ class _Builder:
         faults.attempt(faults.refuse_repeated_names)
         faults.attempt(self._refuse_unused_files)
         faults.attempt(on.refuse_unfit_support)
+        faults.attempt(on.refuse_unfit_spread)
         speed_range = faults.attempt(self._speed_range)
         # A mesh that nobody could solve is not even built.
         of_rotor = RotorEntries(faults)

@@ -257,7 +257,8 @@ def machine_at(
     machine = spread.machine(model, place)
     if case.soil is None or not depends_on_soil(model):
         return machine
-    if spread.changes_ground(place) and case.support.geometry == 'disc':
+    layered = case.ground is not None
+    if spread.changes_ground(place, layered=layered) and case.support.geometry == 'disc':
         machine = replace(machine, soil_models=tuple(
             _other_ground(case, index, spread, place, cache)
             for index in range(len(machine.foundations))))
@@ -282,7 +283,7 @@ def _other_ground(
     return ThinLayerModel(ground, contact, _solved_once(scaled), embedment)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def _solved_once(scaled: Proportions) -> LayeredTable:
     """Return the table of a ground that is looked at more than once, as an input by itself."""
     return scaled.table()

@@ -6,7 +6,7 @@ import math
 from typing import TypeAlias
 
 from rotorsoil_ros.errors import require
-from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil, LEAST_LOSS_FACTOR
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
@@ -173,9 +173,10 @@ class SoilSpread:
             min(max(poisson, 0.0), max(soil.poisson_ratio, highest_poisson_ratio)),
             soil.density * self.scale('soil_density_factor', place), max(loss, 0.0))
 
-    def changes_ground(self, place: Place) -> bool:
-        """Return whether the ground at a place has to be solved anew."""
-        return any(name in place and getattr(self, name) for name in _GROUND)
+    def changes_ground(self, place: Place, *, layered: bool) -> bool:
+        """Return whether the ground at a place has to be solved anew, as layers have for nu."""
+        return any(name in place and getattr(self, name)
+                   for name in (*_GROUND, *(_HALF_WIDTHS if layered else ())))
 
     def ground(
         self, ground: LayeredSoil, embedment: Embedment, place: Place,
@@ -192,6 +193,12 @@ class SoilSpread:
         if self.side_contact is not None and 'side_contact' in place and embedment.depth:
             low, high = self.side_contact
             embedment = replace(embedment, side_contact=low + share('side_contact') * (high - low))
+        ratio, loss = (getattr(self, name) * round(place.get(name, 0.0)) for name in _HALF_WIDTHS)
+        if ratio or loss:
+            ground = ground.changed(lambda soil: replace(
+                soil, loss_factor=max(soil.loss_factor + loss, LEAST_LOSS_FACTOR),
+                poisson_ratio=min(max(soil.poisson_ratio + ratio, 0.0),
+                                  max(soil.poisson_ratio, _SATURATED))))
         if self.ground_water and 'ground_water' in place:
             water = share('ground_water')
             ground = ground.changed(lambda soil: replace(soil, poisson_ratio=(

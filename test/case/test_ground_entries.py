@@ -9,6 +9,7 @@ import yaml
 import rotorsoil_ros as rs
 from rotorsoil_ros.case.design.depth import depth_remarks
 from rotorsoil_ros.case.design.influence import influences, velocity
+from rotorsoil_ros.case.models import machine_at
 from rotorsoil_ros.case.summary import derived_quantities, warnings
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
@@ -159,6 +160,16 @@ def test_depth_of_rock_is_an_input_like_any_other(fan):
                  channel=list(machine.model.channels).index('drive_end_housing_x')), rel=1e-6)
 
 
+def test_damping_of_layers_is_an_input_of_its_own(fan):
+    machine = fan(soil=ROCK, support=THIN)
+    spread, speed = machine.case.uncertainty, np.array([1400.0 * math.pi / 30.0])
+    least, most = (np.abs(machine_at(machine.case, machine.model, spread, {
+        'loss_factor': end}).unbalance_response(speed, machine.case.unbalance).displacement).max()
+        for end in (-1.0, 1.0))
+    # Below the first cut-off nothing but the soil's own loss, 0.02 to 0.08, holds a peak.
+    assert least > 2.0 * most
+
+
 def test_silence_about_rock_is_told_with_its_cost(fan, cache):
     machine = fan()
     [told] = depth_remarks(machine.case, machine.model, cache)
@@ -177,6 +188,17 @@ def test_silence_about_rock_is_told_with_its_cost(fan, cache):
 def test_impossible_spread_is_one_line(fan, keys, fault):
     with pytest.raises(InputError) as caught:
         fan(uncertainty=keys)
+    assert str(caught.value).partition('fan.yaml: ')[2].startswith(fault)
+
+
+@pytest.mark.parametrize('keys, fault', [
+    ({'block': {'embedment': 2.0}, 'support': THIN},
+     'uncertainty.rock_depth: must begin below the base of block (foundations.0), 2 m, got 1.5 m'),
+    ({'support': {'model': 'infinite_elements', 'geometry': 'plane_strain'}},
+     'uncertainty.rock_depth: needs the geometry disc, got plane_strain')])
+def test_rock_where_it_cannot_be_is_one_line(fan, keys, fault):
+    with pytest.raises(InputError) as caught:
+        fan(uncertainty={'rock_depth': [1.5, math.inf]}, **keys)
     assert str(caught.value).partition('fan.yaml: ')[2].startswith(fault)
 
 

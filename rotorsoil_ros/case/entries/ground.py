@@ -117,3 +117,19 @@ class GroundEntries:
         if not entries.foundations:
             raise self.faults.error('foundations', problem='is missing; the support model '
                                                            f'{support.model} needs a block')
+
+    def refuse_unfit_spread(self) -> None:
+        """Raise an InputError where a block would stand in the rock that may be there."""
+        entries = self.faults.entries
+        if entries.uncertainty is None or entries.uncertainty.rock_depth is None:
+            return
+        if entries.support.geometry != 'disc':
+            raise self.faults.error('uncertainty', 'rock_depth', problem=(
+                f'needs the geometry disc, got {entries.support.geometry}: a strip on rock is '
+                'not modelled'))
+        shallowest = entries.uncertainty.rock_depth[0]
+        for index, block in enumerate(entries.foundations):
+            if 0.0 < shallowest <= block.embedment:
+                raise self.faults.error('uncertainty', 'rock_depth', problem=(
+                    f'must begin below the base of {block.name} (foundations.{index}), '
+                    f'{block.embedment:g} m, got {shallowest:g} m'))
