@@ -5,10 +5,14 @@ import pty
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
+from rotorsoil_ros.bags.profile import write_speed_profile
+from rotorsoil_ros.bags.tables.exported import export_log
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.cli import main
+from rotorsoil_ros.units import rpm_to_rad_s
 
 FAN = ['new', 'fan', '--answer', 'power_kw=75', '--answer', 'rpm=990', '--answer',
        'soil=dense_sand']
@@ -24,6 +28,18 @@ def test_case_of_a_fan_runs_through_check_without_an_edit(tmp_path, capsys):
     said = capsys.readouterr().out
     assert 'pedestals (within a factor 2.5)' in said
     assert 'warning' not in said
+
+
+def test_a_recorded_run_is_answered_by_a_new_case_without_an_edit(tmp_path, capsys):
+    case, run = tmp_path / 'fan.yaml', tmp_path / 'run.mcap'
+    assert main([*FAN, '-o', str(case)]) == 0
+    write_speed_profile(run, 'fan', 1_790_000_000 * 10**9 + 10**8 * np.arange(200),
+                        rpm_to_rad_s(np.linspace(300.0, 990.0, 200)))
+    assert main(['predict', str(case), str(run), '-o', str(tmp_path / 'log.mcap'), '--cache',
+                 str(tmp_path)]) == 0
+    assert '200 answered' in capsys.readouterr().out
+    log = export_log(tmp_path / 'log.mcap', tmp_path / 'log.csv')
+    assert log >= 200
 
 
 def test_case_goes_to_standard_output_and_nothing_else_does(tmp_path, capsys):
