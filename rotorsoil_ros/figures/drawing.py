@@ -78,8 +78,8 @@ def _extent(case: Case) -> tuple[float, float, float, float]:
     top = rotor.shaft_height + radius
     ends, reach = [0.0, rotor.length], max(radius, 0.35 * rotor.shaft_height)
     for block in case.foundations:
-        ends += [block.centre_y - _half_length(block), block.centre_y + _half_length(block)]
-        reach = max(reach, _half_width(block))
+        ends += _sides(block, across=False)
+        reach = max(reach, *(abs(side) for side in _sides(block, across=True)))
     edge = 0.05 * (max(ends) - min(ends))
     return min(ends) - edge, max(ends) + edge, reach + edge, top + 3.0 * edge
 
@@ -101,10 +101,13 @@ def _support(case: Case) -> str:
 def _draw_side(axes: Axes, case: Case, *, in_full: bool) -> None:
     rotor, shaft = case.rotor, case.rotor.shaft_height
     for block in case.foundations:
-        half, height = _half_length(block), block.drawn_height
-        axes.add_patch(Box((block.centre_y - half, 0.0), 2.0 * half, height, zorder=1,
+        (first, last), height = _sides(block, across=False), block.drawn_height
+        axes.add_patch(Box((first, 0.0), last - first, height, zorder=1,
                            facecolor=CONCRETE, **_EDGE))
-        axes.annotate(f'{block.name}, {block.mass:g} kg', (block.centre_y, 0.5 * height),
+        left, right = _sides(block, across=True)
+        if not left < 0.0 < right:
+            continue  # beside the shaft, behind the others: the view along it has its name
+        axes.annotate(f'{block.name}, {block.mass:g} kg', (0.5 * (first + last), 0.5 * height),
                       ha='center', va='center', fontsize=7)
     for bearing in rotor.bearings:
         size = _housing_size(case, bearing)
@@ -151,9 +154,12 @@ def _draw_discs(axes: Axes, case: Case) -> None:
 def _draw_end(axes: Axes, case: Case) -> None:
     shaft = case.rotor.shaft_height
     for block in case.foundations:
-        half = _half_width(block)
-        axes.add_patch(Box((-half, 0.0), 2.0 * half, block.drawn_height, zorder=1,
+        left, right = _sides(block, across=True)
+        axes.add_patch(Box((left, 0.0), right - left, block.drawn_height, zorder=1,
                            facecolor=CONCRETE, **_EDGE))
+        if not left < 0.0 < right:
+            axes.annotate(block.name, (0.5 * (left + right), 0.5 * block.drawn_height),
+                          ha='center', va='center', fontsize=7)
     # One behind the other: the one that shows most stands for all.
     flexible = [bearing for bearing in case.rotor.bearings if bearing.pedestal is not None]
     for bearing in (flexible or list(case.rotor.bearings))[:1]:
@@ -263,9 +269,9 @@ def _draw_ground(axes: Axes, case: Case, *, words: bool) -> None:
 def _draw_gaps(axes: Axes, case: Case, *, across: bool) -> None:
     """Draw where the wall of a block stands free in the ground."""
     for block, embedment in zip(case.foundations, case.embedments, strict=True):
-        half = _half_width(block) if across else _half_length(block)
-        centre, wide = 0.0 if across else block.centre_y, _GAP * half
-        for edge in (centre - half - wide, centre + half):
+        first, last = _sides(block, across=across)
+        wide = _GAP * _half(block, across=across)
+        for edge in (first - wide, last):
             axes.add_patch(Box((edge, embedment.depth - embedment.free_depth), wide,
                                embedment.free_depth, zorder=0.4, facecolor='white',
                                linewidth=0.0))
@@ -284,13 +290,15 @@ def _foot(case: Case, bearing: Bearing) -> float:
                  if block.name == bearing.foundation), 0.0)
 
 
-def _half_width(block: Foundation) -> float:
-    (left, right), _ = extents(block.contact)
-    return 0.5 * (right - left)
+def _sides(block: Foundation, *, across: bool) -> tuple[float, float]:
+    """Return where a block begins and ends, across the shaft or along it [m]."""
+    first, last = extents(block.contact)[0 if across else 1]
+    centre = block.centre_x if across else block.centre_y
+    return centre + first, centre + last
 
 
-def _half_length(block: Foundation) -> float:
-    _, (first, last) = extents(block.contact)
+def _half(block: Foundation, *, across: bool) -> float:
+    first, last = _sides(block, across=across)
     return 0.5 * (last - first)
 
 

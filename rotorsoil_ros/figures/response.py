@@ -13,6 +13,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import ACROSS, across, Channel, DOFS, HOUSING, JOURNAL
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.figures.drawing import machine_drawing
+from rotorsoil_ros.figures.site import site_plan
 from rotorsoil_ros.ground.soil import Circle, singular_of, Soil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
@@ -43,6 +44,8 @@ def all_figures(
     """Yield name and figure of every picture of a case."""
     predictor = table.predictor(case.unbalance)
     yield 'machine', machine_drawing(case)
+    if case.support.model == 'boundary_elements':
+        yield 'plan', site_plan(case)
     if case.support.model != 'rigid':
         yield 'support', support(case, model)
     for kind, channels in channel_groups(case).items():

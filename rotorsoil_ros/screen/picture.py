@@ -7,6 +7,7 @@ import rerun as rr
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.ground.plan import Part
 from rotorsoil_ros.screen.recording import Recording
 from rotorsoil_ros.screen.scene import Block, Scene
 from rotorsoil_ros.units import rad_s_to_rpm
@@ -109,25 +110,33 @@ class Picture:
         log('shaft_at_rest', rr.LineStrips3D([axis], colors=(*STEEL, 90), radii=EDGE_RADIUS))
         log('pedestals', self._pedestals(scene.ground_seats, foot=0.0))
         for block in scene.blocks:
-            size = (2.0 * block.half_width, 2.0 * block.half_length, block.height)
-            centre, seats = (0.0, 0.0, 0.5 * block.height), np.array(block.seats) - block.centre_y
+            parts = block.parts or (Part(block.half_width, block.half_length, 0.0, 0.0),)
+            sizes = [(2.0 * part.half_width, 2.0 * part.half_length, block.height)
+                     for part in parts]
+            centres = [(part.x, part.y, 0.5 * block.height) for part in parts]
+            seats = np.array(block.seats) - block.centre_y
             # What is static hides what moves: the block stands here and moves one level below.
-            log(block.name, rr.Transform3D(translation=(0.0, block.centre_y, 0.0)))
+            log(block.name, rr.Transform3D(
+                translation=(block.centre_x, block.centre_y, 0.0)))
             if block.hole:
                 log(f'{block.name}/ground', rr.LineStrips3D(
                     block.hole, colors=EARTH, radii=EDGE_RADIUS))
             log(f'{block.name}/{MOVING}/body', rr.Boxes3D(
-                sizes=[size], centers=[centre], colors=CONCRETE, fill_mode='solid'))
+                sizes=sizes, centers=centres, colors=CONCRETE, fill_mode='solid'))
             log(f'{block.name}/{MOVING}/edges', rr.Boxes3D(
-                sizes=[size], centers=[centre], colors=EDGE, radii=EDGE_RADIUS))
-            log(f'{block.name}/{MOVING}/pedestals', self._pedestals(seats, foot=block.height))
+                sizes=sizes, centers=centres, colors=EDGE, radii=EDGE_RADIUS))
+            log(f'{block.name}/{MOVING}/pedestals', self._pedestals(
+                seats, foot=block.height, across=-block.centre_x))
 
-    def _pedestals(self, seats: Iterable[float], *, foot: float) -> rr.LineStrips3D:
-        """Return one trestle from its foot to the shaft axis at each seat."""
+    def _pedestals(
+        self, seats: Iterable[float], *, foot: float, across: float = 0.0,
+    ) -> rr.LineStrips3D:
+        """Return one trestle from its foot to the shaft axis, so far across, at each seat."""
         top = self._scene.shaft_height
         spread = 0.3 * (top - foot)
         return rr.LineStrips3D(
-            [[(-spread, y, foot), (0.0, y, top), (spread, y, foot)] for y in seats],
+            [[(across - spread, y, foot), (across, y, top), (across + spread, y, foot)]
+             for y in seats],
             colors=EDGE, radii=SHAFT_RADIUS)
 
     def _log(self, name: str, what: rr.AsComponents) -> None:

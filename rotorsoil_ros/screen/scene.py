@@ -10,7 +10,8 @@ from scipy.interpolate import CubicSpline
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import across, Channel, DOFS, JOURNAL
-from rotorsoil_ros.ground.soil import extents
+from rotorsoil_ros.ground.plan import Part
+from rotorsoil_ros.ground.soil import Circle, extents, parts_of
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.disc import Disc
 
@@ -63,6 +64,8 @@ class Block:
     channels: tuple[int, ...]
     is_schematic: bool
     embedment: float = 0.0
+    centre_x: float = 0.0
+    parts: tuple[Part, ...] = ()
 
     @property
     def hole(self) -> list[list[tuple[float, float, float]]]:
@@ -194,9 +197,11 @@ def _block(foundation: Foundation, case: Case, index: Mapping[str, int]) -> Bloc
     seats = tuple(bearing.position for bearing in case.rotor.bearings
                   if bearing.foundation == foundation.name)
     channels = tuple(index[Channel(foundation.name, '', dof)] for dof in DOFS)
+    parts = () if isinstance(foundation.contact, Circle) else parts_of(foundation.contact)
     height = foundation.height or BLOCK_SHARE * case.rotor.shaft_height
     return Block(foundation.name, width, length, height,
-                 foundation.centre_y, seats, channels, foundation.height is None)
+                 foundation.centre_y, seats, channels, foundation.height is None,
+                 centre_x=foundation.centre_x, parts=parts)
 
 
 def _bending(stations: Sequence[float], y: FloatArray) -> FloatArray:

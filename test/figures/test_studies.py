@@ -12,6 +12,7 @@ from rotorsoil_ros.case.config import load
 from rotorsoil_ros.figures.bearings import bearing_figures
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.response import compliance_figure, main_peaks
+from rotorsoil_ros.figures.site import site_plan
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
@@ -137,3 +138,14 @@ def test_films_are_drawn_with_what_the_rotor_stands_on():
     for axes in figures['bearing_drive_end'].axes:
         assert axes.get_xlabel().endswith(']')
         assert axes.get_ylabel().endswith(']')
+
+
+def test_plan_of_a_site_is_drawn_where_blocks_and_probes_are():
+    case = load(PAPER.parent / 'fan_on_l_block.yaml')
+    [axes] = site_plan(case).axes
+    drawn = [(patch.get_x(), patch.get_y(), patch.get_width(), patch.get_height())
+             for patch in axes.patches]
+    np.testing.assert_allclose(drawn, [
+        (-1.0, -1.3, 2.0, 3.0), (-1.8, -1.3, 0.8, 1.5), (1.8, -1.3, 2.0, 3.0)], atol=1e-12)
+    places = [line.get_xydata()[0].tolist() for line in axes.get_lines()]
+    assert [8.8, 0.2] in places
