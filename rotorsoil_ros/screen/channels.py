@@ -47,7 +47,8 @@ def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]
     """Return how the channels of a case are shown."""
     owners = {bearing.name: JOURNALS for bearing in case.rotor.bearings}
     owners |= {disc.name: DISCS for disc in case.rotor.discs}
-    owners |= {probe.name: PROBES for probe in (*case.rotor.probes, *case.ground_probes)}
+    owners |= {probe.name: PROBES for probe in case.rotor.probes}
+    owners |= {probe.name: PROBES for probe in case.ground_probes}
     owners |= {foundation.name: BLOCK for foundation in case.foundations}
     shown: list[Trend] = []
     for channel in channels:
