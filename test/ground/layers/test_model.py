@@ -57,6 +57,16 @@ def test_own_check_of_a_table_is_not_optimistic(ground):
     assert table.measured_error <= 1e-4
 
 
+def test_table_of_contrasts_and_little_damping_settles():
+    # Nearly incompressible crust on soft clay on rock, a base between them: round-off of 1e-4.
+    crust = Soil(40e6, 0.49, 1900.0, 0.005)
+    clay = Soil(10e6, 0.45, 1900.0, 0.01)
+    model = ThinLayerModel.solved(
+        LayeredSoil((Layer(0.4, crust), Layer(2.0, clay)), None), Circle(1.0), omega_max=80.0,
+        embedment=Embedment(0.4))
+    assert model.table.measured_error <= 1e-3
+
+
 def test_table_survives_its_file(on_rock):
     again = LayeredTable.from_arrays(on_rock.table.to_arrays())
     a0 = np.linspace(0.0, again.edges[-1], 50)
