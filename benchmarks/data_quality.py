@@ -11,6 +11,7 @@ import time as clock
 
 import numpy as np
 
+from rotorsoil_ros.case.entries.sensors import Pickup
 from rotorsoil_ros.monitor.vectors.orders import demodulate, OrderVector, SpeedTrack, Turning
 from rotorsoil_ros.monitor.vectors.stretch import Finding, Stretch
 
@@ -85,8 +86,8 @@ def find(made: Record, *, has_filter: bool = True) -> tuple[OrderVector | str, R
     time, values = time[inside], values[inside]
     angle = made.track.at(time)[0]
     end = int(np.argmax(angle - angle[0] >= TURNS * 2.0 * np.pi)) or len(time) - 1
-    stretch = Stretch(Turning.of(time[:end], made.track), values[:end], float(time[end]), TURNS,
-                      has_filter)
+    stretch = Stretch(Turning.of(time[:end], made.track), values[:end], np.abs(values[:end]),
+                      float(time[end]), TURNS, Pickup(has_filter=has_filter))
     found = Finding(stretch, made.track).vector()
     return (found if isinstance(found, OrderVector) else str(found.flaw)), replace(
         made, time=time[:end], values=values[:end])

@@ -124,8 +124,11 @@ class Samples:
         When [ns], and what was felt [m/s^2].
     is_synthetic : bool
         Computed, not measured.
-    turned : (n,) float array
-        Angle by which the sensor says that its axes are turned [rad]; empty: it says nothing.
+    felt : (n, 3) float array
+        Along all axes of the sensor [m/s^2]; empty: it has no other.
+    orientation : (n, 4) float array
+        Unit quaternion x, y, z, w by which the sensor says that its axes are turned, NaN where it
+        says nothing; empty: it never does.
 
     """
 
@@ -134,7 +137,8 @@ class Samples:
     stamp_ns: IntArray
     acceleration: FloatArray
     is_synthetic: bool = False
-    turned: FloatArray = field(default_factory=lambda: np.zeros(0))
+    felt: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    orientation: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ RADIANS_PER_TURN = 2.0 * math.pi
 SECONDS_PER_MINUTE = 60.0
 
 GRAVITY = 9.81  # [m/s^2]
+STANDARD_GRAVITY = 9.80665  # [m/s^2] in one g
 
 # rad/s in one of each unit that a speed is told in.
 SPEED_UNITS = {'rad_s': 1.0, 'rpm': RADIANS_PER_TURN / SECONDS_PER_MINUTE,

@@ -12,6 +12,7 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.cli import main
+from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.monitor.verdict import Verdict
 from rotorsoil_ros.wire.cdr import Layout
@@ -146,6 +147,73 @@ def test_sensor_that_says_it_is_turned_is_refused(fan, tmp_path, quaternion, cov
         assert ('by 90 deg' if quaternion[3] < 0.8 else 'by 6 deg') in refused[0]
 
 
+def in_g(felt):
+    felt[:] = (felt + np.array([0.0, 0.0, 9.80665]) * (np.abs(felt[:, 2:]) < 5.0)) / 9.80665
+
+
+def test_samples_in_g_are_refused_until_the_case_says_so(fan, tmp_path):
+    log = restamped(tmp_path / 'log.mcap', change=in_g)
+    found = compare(log, FAN, cache_directory=fan.directory)
+    assert found.verdict == Verdict.UNDECIDED
+    assert not [entry for entry in found.zones if entry.source == 'measured']
+    assert any('stretches refused: looks like g, not m/s^2' in line for line in found.remarks)
+    found = compare(log, fan.case.changed(['sensors.units=g']), cache_directory=fan.directory)
+    [zone] = [entry for entry in found.zones if entry.source == 'measured']
+    assert 1e3 * zone.velocity == pytest.approx(1.14, abs=0.01)
+    assert found.verdict == Verdict.PASSES
+
+
+def test_range_of_one_sensor_refuses_what_reaches_it(fan, tmp_path):
+    log = restamped(tmp_path / 'log.mcap')
+    for channel, verdict in ((X, Verdict.UNDECIDED), ('fan_end_housing_x', Verdict.PASSES)):
+        case = fan.case.changed([f'sensors.channels.{channel}.range=0.08 m/s^2'])
+        found = compare(log, case, cache_directory=fan.directory)
+        assert found.verdict == verdict
+        assert any('refused: clipped at' in line for line in found.remarks) == (channel == X)
+
+
+def lie(felt):
+    felt[:, 0], felt[:, 2] = felt[:, 2].copy(), -felt[:, 0]
+
+
+def test_orientation_that_the_case_uses_gives_the_truth(fan, tmp_path):
+    """A quarter turn about y brings z to x and x to -z: the truth is that of the log as it was."""
+    log = restamped(tmp_path / 'log.mcap', change=lie, say=turn((0.0, -0.5**0.5, 0.0, 0.5**0.5)))
+    found = compare(log, FAN, cache_directory=fan.directory)
+    assert found.verdict == Verdict.UNDECIDED
+    found = compare(log, fan.case.changed(['sensors.orientation=use']),
+                    cache_directory=fan.directory)
+    [zone] = [entry for entry in found.zones if entry.source == 'measured']
+    assert 1e3 * zone.velocity == pytest.approx(1.14, abs=0.01)
+    assert found.verdict == Verdict.PASSES
+
+
+@pytest.mark.parametrize('setting, said', [
+    ('sensors.range=-5', 'sensors.range: must be > 0 m/s^2, got -5'),
+    ('sensors.range=5 kg', "sensors.range: must be a finite number in m/s^2, got '5 kg', which is "
+                           'none of that'),
+    ('sensors.units=mm', "sensors.units: must be 'm/s^2' or 'g', got 'mm'"),
+    ('sensors.orientation=true', "sensors.orientation: must be 'use', got True"),
+    ('sensors.rnge=5', 'sensors.rnge: is not a known key; did you mean range?'),
+    ('sensors.channels.drive_end_hosing_x.range=5', 'sensors.channels.drive_end_hosing_x: is '
+     'not a channel of this machine; did you mean drive_end_housing_x?'),
+    (f'sensors.channels.{X}.range=0', f'sensors.channels.{X}.range: must be > 0 m/s^2, got 0')])
+def test_wrong_words_of_sensors_are_one_line(fan, setting, said):
+    with pytest.raises(InputError) as refused:
+        fan.case.changed([setting])
+    assert str(refused.value) == f'{FAN}: {said}'
+
+
+def test_what_one_sensor_does_not_say_the_others_do(fan):
+    case = fan.case.changed(['sensors={units: g, range: 16 g}',
+                             f'sensors.channels.{X}.range=50 m/s^2'])
+    one, other = case.sensors.of(X), case.sensors.of('fan_end_housing_x')
+    assert (one.units, other.units) == ('g', 'g')
+    assert one.range == 50.0
+    assert other.range == pytest.approx(16.0 * 9.80665, rel=1e-12)
+
+
 def test_filter_that_the_case_states_reaches_the_judge(fan):
-    assert not Judging.of(fan.case).has_filter
-    assert Judging.of(fan.case.changed(['anti_alias=true'])).has_filter
+    assert not Judging.of(fan.case).sensors.of(X).has_filter
+    for key in ('anti_alias', 'sensors.anti_alias', f'sensors.channels.{X}.anti_alias'):
+        assert Judging.of(fan.case.changed([f'{key}=true'])).sensors.of(X).has_filter

@@ -129,7 +129,7 @@ class _Reading:
         collector, unbalances = Collector(), [(0, expectation.case.unbalance)]
         monitor = Monitor(
             machine, expectation.table, expectation.case.unbalance, sinks=[collector],
-            judging=Judging(rules, self.wish.turns, has_filter=expectation.case.anti_alias),
+            judging=Judging(rules, self.wish.turns, sensors=expectation.case.sensors),
             hindsight=hindsight, oils=self.oils)
         monitor.judge.take_criteria(expectation.criteria(expectation.case.unbalance))
 

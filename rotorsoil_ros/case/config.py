@@ -15,10 +15,12 @@ from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, message
 from rotorsoil_ros.case.entries.entry import faults
 from rotorsoil_ros.case.entries.ground import GroundEntries, THIN_LAYERS
+from rotorsoil_ros.case.entries.sensors import Sensors, sensors_of
 from rotorsoil_ros.case.entries.site import GroundProbe, SiteEntries
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import a0_range
@@ -73,8 +75,8 @@ class Case:
         How far the soil may be from what the file says.
     zones : ZoneLimits
         Of housing velocity.
-    anti_alias : bool
-        Whether a filter before each sensor's converter lets nothing above half its rate pass.
+    sensors : Sensors
+        What is known of the accelerometers.
     journals : tuple of Journal
         Those of its bearings that are given by their geometry.
     oil_temperatures : tuple of float
@@ -103,7 +105,7 @@ class Case:
     tables: tuple[ComplianceTable, ...] = ()
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
-    anti_alias: bool = False
+    sensors: Sensors = field(default_factory=Sensors)
     journals: tuple[Journal, ...] = field(default=(), compare=False)
     oil_temperatures: tuple[float, ...] = ()
     cache_directory: Path | None = field(default=None, compare=False, repr=False)
@@ -278,15 +280,15 @@ class _Builder:
             embedments=embedments, support=entries.support, foundations=foundations,
             rotor=floated(rotor, journals), unbalance=unbalance, couples=unbalances.couples(),
             speed_range=speed_range, ground_probes=probes, tables=tables,
-            uncertainty=uncertainty, zones=zones, anti_alias=self.faults.entries.anti_alias,
-            journals=journals, oil_temperatures=oils, cache_directory=self.cache_directory,
-            content=self.content, files=self.files)
+            uncertainty=uncertainty, zones=zones, journals=journals, oil_temperatures=oils,
+            cache_directory=self.cache_directory, content=self.content, files=self.files)
         with faults.at('rotor', entry=entries.rotor):
-            self._refuse_size(CoupledModel(
-                case.rotor, case.foundations, [RigidSoil() for _ in case.foundations],
-                case.couples))
+            model = CoupledModel(case.rotor, case.foundations,
+                                 [RigidSoil() for _ in case.foundations], case.couples)
+            self._refuse_size(model)
         self._refuse_unreachable_soil(case)
-        return case
+        return replace(case, sensors=sensors_of(faults, [*model.channels, *(
+            Channel(probe.name, '', axis) for probe in probes for axis in DOFS[:3])]))
 
     def _journals(self) -> JournalEntries:
         return JournalEntries(self.faults, cache.directory(self.cache_directory))

@@ -57,9 +57,11 @@ def _converted(number: float, given: str, unit: str, rule: str) -> float:
     import pint  # a quarter of a second, for who writes units only
 
     said = f'{number:g} {given}'
+    # Of an acceleration it is that of gravity and no gram.
+    known = 'standard_gravity' if unit == 'm/s^2' and given.strip() == 'g' else given
     try:
         registry = _registry()
-        return float(registry.Quantity(number, given).to(_spelled(unit)).magnitude)
+        return float(registry.Quantity(number, known).to(_spelled(unit)).magnitude)
     except pint.UndefinedUnitError as error:
         raise ValueError(f'{rule}, got {shown(said)}, a unit that is not known') from error
     except pint.DimensionalityError as error:
@@ -128,6 +130,7 @@ Ratio = Annotated[float, _number_in('')]
 Metre = Annotated[float, _number_in('m')]
 MetreOrEndless = Annotated[float, _number_in('m', may_be_endless=True)]
 MetrePerSecond = Annotated[float, _number_in('m/s')]
+MetrePerSecondSquared = Annotated[float, _number_in('m/s^2')]
 Kilogram = Annotated[float, _number_in('kg')]
 Kilowatt = Annotated[float, _number_in('kW')]
 KilogramPerMetre = Annotated[float, _number_in('kg/m')]

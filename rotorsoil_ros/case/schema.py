@@ -20,6 +20,7 @@ from rotorsoil_ros.case.quantities import (
     Metre,
     MetreOrEndless,
     MetrePerSecond,
+    MetrePerSecondSquared,
     Name,
     Pascal,
     Radian,
@@ -237,6 +238,21 @@ class ZonesEntry(Entry):
     baseline: MetrePerSecond | None = None
 
 
+class PickupEntry(Entry):
+    """What is known of an accelerometer; what is not said is not known."""
+
+    range: MetrePerSecondSquared | None = None
+    units: Literal['m/s^2', 'g'] | None = None
+    orientation: Literal['use'] | None = None
+    anti_alias: StrictBool | None = None
+
+
+class SensorsEntry(PickupEntry):
+    """What is known of all of them, and of some in other words."""
+
+    channels: dict[Name, PickupEntry] = Field(default_factory=dict)
+
+
 class Document(Entry):
     """The whole file."""
 
@@ -250,4 +266,5 @@ class Document(Entry):
     speed_range_rpm: tuple[Rpm, Rpm]
     uncertainty: Uncertainty | None = None
     zones: ZonesEntry | None = None
+    sensors: SensorsEntry = Field(default_factory=SensorsEntry)
     anti_alias: bool = False

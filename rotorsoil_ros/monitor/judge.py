@@ -33,6 +33,7 @@ from rotorsoil_ros.monitor.quasistatic import Pace
 from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.monitor.suspicion import Suspicion
 from rotorsoil_ros.monitor.sweep import Sweeps
+from rotorsoil_ros.monitor.vectors.axes import in_si
 from rotorsoil_ros.monitor.vectors.demodulation import Demodulator
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.pairing import Pairing, Runout, Vectors
@@ -123,6 +124,10 @@ class Judge:
         self._pairing.take(measured)
         yield from self._matched()
 
+    def in_si(self, samples: Samples) -> Samples:
+        """Return raw samples in m/s^2, as the case says in which unit they are told."""
+        return in_si(samples, self._judging.sensors.of(samples.channel))
+
     def on_samples(self, samples: Samples) -> None:
         """Keep raw samples until the tick."""
         self.is_synthetic |= samples.is_synthetic
@@ -130,7 +135,7 @@ class Judge:
         if known is None:
             known = self._demodulators[samples.channel] = Demodulator(
                 self.machine, samples.channel, self.history, turns=self._judging.turns,
-                has_filter=self._judging.has_filter)
+                pickup=self._judging.sensors.of(samples.channel))
         known.take(samples)
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> Iterator[Event]:

@@ -116,6 +116,7 @@ class Monitor:
     def on_samples(self, samples: Samples) -> None:
         """Hand on raw samples; the vectors that are in them are found at the next tick."""
         self.health.note('samples', len(samples.stamp_ns))
+        samples = self.judge.in_si(samples)
         self._emit(samples)
         self.judge.on_samples(samples)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 import math
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.entries.sensors import Sensors
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
 from rotorsoil_ros.errors import require
 
@@ -85,18 +86,18 @@ class Judging:
         Turns of the rotor that make one vector of raw samples.
     band_period_s : float
         Message time between two bands while the speed changes; 0: one with every speed [s].
-    has_filter : bool
-        Whether a filter before each sensor's converter lets nothing above half its rate pass.
+    sensors : Sensors
+        What is known of the accelerometers.
 
     """
 
     rules: Rules = field(default_factory=Rules)
     turns: float = 10.0
     band_period_s: float = 0.1
-    has_filter: bool = False
+    sensors: Sensors = field(default_factory=Sensors)
 
     @classmethod
     def of(cls, case: Case, *, matching: Matching | None = None, **other: float) -> 'Judging':
         """Return how a case is judged."""
         return cls(Rules(matching=matching or Matching(), zones=case.zones),
-                   has_filter=case.anti_alias, **other)
+                   sensors=case.sensors, **other)

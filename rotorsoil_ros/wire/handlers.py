@@ -150,7 +150,7 @@ def _tell_samples(
     monitor.on_samples(Samples(
         monitor.machine, channel, stamp_ns,
         samples.acceleration[rows, AXES.index(channel.axis)], samples.is_synthetic,
-        samples.turned[rows]))
+        samples.acceleration[rows], samples.orientation[rows]))
 
 
 def _tell_oil(

@@ -31,13 +31,13 @@ class Accelerations:
     """
     Stamps (n,) [ns] and accelerations (n, 3) [m/s^2], NaN where the sensor has none.
 
-    `turned` is the angle (n,) by which its orientation turns the axes [rad], 0 if it has none.
+    `orientation` is a unit quaternion (n, 4) x, y, z, w, NaN where the sensor has none.
     """
 
     stamp_ns: IntArray
     acceleration: FloatArray
     is_synthetic: bool
-    turned: FloatArray
+    orientation: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,22 +102,19 @@ def accelerations(layout: Layout, cdrs: Sequence[bytes]) -> Accelerations:
     acceleration[np.abs(acceleration) > LARGEST_ACCELERATION] = np.nan
     return Accelerations(_stamps(rows), acceleration,
                          layout.texts['header.frame_id'][0].startswith(SYNTHETIC),
-                         _turned(rows))
+                         _orientation(rows))
 
 
-def _turned(rows: np.ndarray) -> FloatArray:
-    """Return the angles (n,) by which orientations turn [rad], 0 where none is told."""
+def _orientation(rows: np.ndarray) -> FloatArray:
+    """Return orientations (n, 4) as unit quaternions, NaN where none is told."""
     quaternion = rows['orientation'].astype(float)
     largest = np.max(np.abs(quaternion), axis=1)
     is_told = (np.isfinite(largest) & (largest > 0.0)
                & (rows['orientation_covariance'][:, 0] != NOT_MEASURED))
     # Only its direction counts; whoever sends 1e300 must not make squares overflow.
-    quaternion = np.where(is_told[:, None], quaternion, 0.0) / np.where(
+    scaled = np.where(is_told[:, None], quaternion, np.nan) / np.where(
         is_told, largest, 1.0)[:, None]
-    # The whole angle from both parts: of a small one the cosine alone has no digits.
-    angle = 2.0 * np.arctan2(np.linalg.norm(quaternion[:, :3], axis=1),
-                             np.abs(quaternion[:, 3]))
-    return np.where(is_told, angle, 0.0)
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])
 
 
 def _stamps(rows: np.ndarray) -> IntArray:

@@ -104,6 +104,53 @@ def test_live_and_compare_refuse_the_same_samples(answered, fan, tmp_path, tick_
     assert monitor.judge.account.failures() == offline.failures
 
 
+@pytest.mark.parametrize('tick_ns', [1, 370_000_000])
+def test_live_and_compare_refuse_the_same_axes(answered, fan, tmp_path, tick_ns):
+    """Of a sensor in g on its side that says so, strays for a while and reaches its range."""
+    log = tilted(answered, tmp_path / 'log.mcap')
+    case = fan.case.changed(['sensors={units: g, orientation: use, range: 1.03 g}'])
+    offline = compare(log, case, cache_directory=fan.directory)
+    monitor, _, collector = live(log, fan, tick_ns=tick_ns, judging=Judging.of(case))
+    refused = [f'{channel}: {line}' for channel, refusals in monitor.judge.refusals.items()
+               for line in refusals.lines()]
+    assert [line for line in offline.remarks if line in refused] == refused
+    for why in ('strays by 5 deg', 'clipped at'):
+        assert [line for line in refused if why in line], why
+    [refusals] = monitor.judge.refusals.values()
+    assert refusals.gravity.startswith('gravity seen')
+    found = {points.channel: points for points in collector.points()}
+    kept = refusals.stretches - sum(refusals.counts.values())
+    assert kept > 10
+    assert [len(points.stamp_ns) for points in offline.points] == [kept]
+    for points in offline.points:
+        for name in ('stamp_ns', 'amplitude', 'phase', 'reason'):
+            np.testing.assert_array_equal(
+                getattr(found[points.channel], name), getattr(points, name), err_msg=name)
+    assert monitor.judge.account.failures() == offline.failures
+
+
+def tilted(answered, path):
+    """Write speeds and one sensor of a log, turned by a quarter about y, and in g."""
+    with LogFile(path) as log:
+        for batch in bag_reader.batches(
+                answered, lambda topic, _: topic.endswith(('fan_end_housing_x/imu', 'states')),
+                at_most=500):
+            if not batch.topic.endswith('imu'):
+                log.write(batch)
+                continue
+            layout = Layout.of(IMU, batch.payloads[0])
+            rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
+            felt = rows['linear_acceleration']
+            felt[:] = felt[:, [2, 1, 0]] * [1.0, 1.0, -1.0] / 9.80665
+            second = (np.array(batch.log_time_ns) - START) // SECOND
+            half = 0.5 * np.radians(np.where((second >= 20) & (second < 24), -85.0, -90.0))
+            rows['orientation'] = rows['orientation_covariance'] = 0.0
+            rows['orientation'][:, 1], rows['orientation'][:, 3] = np.sin(half), np.cos(half)
+            log.write(Records(batch.topic, IMU, batch.log_time_ns, [
+                bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]))
+    return path
+
+
 def spoiled(answered, path):
     """Write speeds and one sensor of a log, its samples spoiled in some seconds."""
     rail = None

@@ -1,5 +1,7 @@
 """The layout that is read from bytes is the one that ROS writes."""
 
+import math
+
 from hypothesis import given, strategies as some
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from sensor_msgs.msg import JointState
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import JOINT_STATE
-from rotorsoil_ros.wire.sensors import _turned, joint_states as decode, JointStateReader
+from rotorsoil_ros.wire.sensors import _orientation, joint_states as decode, JointStateReader
 
 NUMBERS = some.floats(allow_nan=False)
 WORDS = some.text(some.characters(codec='ascii', exclude_characters='\0'), max_size=9)
@@ -118,4 +120,5 @@ def test_size_of_an_orientation_does_not_matter(size):
     rows = np.zeros(1, dtype=kind)
     rows['orientation'] = [size, 0.0, 0.0, size]
     told = np.isfinite(size) and size > 0.0
-    assert _turned(rows)[0] == pytest.approx(0.5 * np.pi if told else 0.0)
+    np.testing.assert_allclose(_orientation(rows), [4 * [np.nan] if not told else [
+        math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]])

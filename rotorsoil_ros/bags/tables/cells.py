@@ -11,7 +11,7 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
-from rotorsoil_ros.units import SECONDS_PER_MINUTE
+from rotorsoil_ros.units import SECONDS_PER_MINUTE, STANDARD_GRAVITY
 
 NOTHING_SAID = frozenset({'', '-', '--', '---', 'nan', 'n/a', 'na', '#n/a', 'null', 'none'})
 GROUPED = re.compile(r'[-+]?\d{1,3}(?P<sign>[., \u00a0\u202f\'])\d{3}(?:(?P=sign)\d{3})*(?![\d])')
@@ -36,7 +36,7 @@ MOTIONS = {
     'mil': (0, 25.4e-6), 'mils': (0, 25.4e-6), 'in': (0, 25.4e-3),
     'm/s': (1, 1.0), 'mm/s': (1, 1e-3), 'um/s': (1, 1e-6), 'in/s': (1, 25.4e-3),
     'ips': (1, 25.4e-3),
-    'm/s^2': (2, 1.0), 'mm/s^2': (2, 1e-3), 'g': (2, 9.80665),
+    'm/s^2': (2, 1.0), 'mm/s^2': (2, 1e-3), 'g': (2, STANDARD_GRAVITY),
     'rad': (0, 1.0), 'mrad': (0, 1e-3), 'urad': (0, 1e-6), 'deg': (0, math.radians(1.0)),
     'rad/s': (1, 1.0), 'mrad/s': (1, 1e-3), 'deg/s': (1, math.radians(1.0)),
     'rad/s^2': (2, 1.0)}

@@ -8,18 +8,22 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
-from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.case.entries.sensors import Pickup
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.events import Demodulated, NANOSECONDS, Samples
+from rotorsoil_ros.monitor.vectors.axes import Axes, said_with
 from rotorsoil_ros.monitor.vectors.history import History
-from rotorsoil_ros.monitor.vectors.orders import LARGEST_ACCELERATION, OrderVector, Turning
+from rotorsoil_ros.monitor.vectors.orders import (
+    LARGEST_ACCELERATION,
+    OrderVector,
+    SpeedTrack,
+    Turning,
+)
 from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
 from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE, Finding, Stretch, TOLD
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
 MOST_SAMPLES = 1 << 16  # samples of a channel that wait for their speed
-
-# Axes that a sensor says are turned by more than this are not those of the machine [rad].
-_TURNED = math.radians(5.0)
 
 # So many vectors are looked at, at least so many of them; beyond this ratio of what they scatter
 # by to what they say, they err by the former: of white noise 1.5 is exceeded once in a hundred.
@@ -36,11 +40,12 @@ class Demodulator:
 
     def __init__(
         self, machine: str, channel: Channel, history: History, *, turns: float,
-        has_filter: bool = False,
+        pickup: Pickup,
     ) -> None:
         self._machine, self._channel = machine, channel
         self._history = history
-        self._turns, self._has_filter = turns, has_filter
+        self._turns, self._pickup = turns, pickup
+        self._axes = Axes(pickup, DOFS.index(channel.axis))
         self._parts: list[tuple[IntArray, FloatArray, FloatArray]] = []
         self._count = 0
         self._done_ns = -1
@@ -50,8 +55,7 @@ class Demodulator:
 
     def take(self, samples: Samples) -> None:
         """Keep samples; the oldest are left out if nobody tells the speed."""
-        turned = samples.turned if len(samples.turned) else np.zeros(len(samples.stamp_ns))
-        self._parts.append((samples.stamp_ns, samples.acceleration, turned))
+        self._parts.append((samples.stamp_ns, samples.acceleration, said_with(samples)))
         self._count += len(samples.stamp_ns)
         while self._count > MOST_SAMPLES and len(self._parts) > 1:
             gone = len(self._parts.pop(0)[0])
@@ -63,39 +67,39 @@ class Demodulator:
         told = self._history.track()[0]
         if not self._parts or not len(told):
             return
-        stamps, values, turned = self._gathered(int(told[0]))
+        stamps, values, said = self._gathered(int(told[0]))
         found = []
         while (known := int(np.searchsorted(stamps, told[-1], side='right'))):
-            vector, taken = self._first(stamps[:known], values[:known], turned[:known])
+            vector, taken = self._first(stamps[:known], values[:known], said[:known])
             if not taken:
                 break
             self._done_ns = int(stamps[taken - 1])
-            stamps, values, turned = stamps[taken:], values[taken:], turned[taken:]
+            stamps, values, said = stamps[taken:], values[taken:], said[taken:]
             if vector is not None:
                 found.append(vector)
-        self._parts, self._count = [(stamps, values, turned)], len(stamps)
+        self._parts, self._count = [(stamps, values, said)], len(stamps)
         if found:
             yield self._event(found)
 
     def _gathered(self, begin_ns: int) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return what has been kept, in order; too late or before every speed is left out."""
-        stamps, values, turned = (np.concatenate(part) for part in zip(
+        stamps, values, said = (np.concatenate(part) for part in zip(
             *self._parts, strict=True))
         chosen = ((stamps >= begin_ns) & (stamps > self._done_ns)
                   & (np.abs(values) <= LARGEST_ACCELERATION))
         self.left_out += len(stamps) - int(np.count_nonzero(chosen))
-        stamps, values, turned = stamps[chosen], values[chosen], turned[chosen]
+        stamps, values, said = stamps[chosen], values[chosen], said[chosen]
         # By value where stamps are equal: a log may hold such samples in another order.
         order = np.lexsort((values, stamps))
-        stamps, values, turned = stamps[order], values[order], turned[order]
+        stamps, values, said = stamps[order], values[order], said[order]
         again = np.concatenate([[False], (np.diff(stamps) == 0) & (np.diff(values) == 0.0)])
         if again.any():
             self.refusals.left_out['samples told twice'] += int(np.count_nonzero(again))
-            stamps, values, turned = stamps[~again], values[~again], turned[~again]
-        return stamps, values, turned
+            stamps, values, said = stamps[~again], values[~again], said[~again]
+        return stamps, values, said
 
     def _first(
-        self, stamps: IntArray, values: FloatArray, turned: FloatArray,
+        self, stamps: IntArray, values: FloatArray, said: FloatArray,
     ) -> tuple[tuple[int, OrderVector] | None, int]:
         """Return stamp and vector of the first stretch, and how many samples it takes."""
         # Counted from its own first sample, it does not matter when this is asked.
@@ -107,13 +111,8 @@ class Demodulator:
         end = int(np.argmax(at.angle - at.angle[0] >= self._turns * RADIANS_PER_TURN))
         if not end:
             return None, 0
-        finding = Finding(Stretch(at.rows(slice(0, end)), values[:end], float(time[end]),
-                                  self._turns, self._has_filter), track)
-        tilt = float(np.max(turned[:end]))
-        found: OrderVector | Refusal = finding.vector() if tilt <= _TURNED else Refusal(
-            Flaw.TURNED, f'the orientation of the sensor turns its axes by '
-                         f'{math.degrees(tilt):.0f} deg')
-        self.refusals.left_out.update(finding.left_out)
+        found = self._found(at.rows(slice(0, end)), values[:end], said[:end], float(time[end]),
+                            track)
         if isinstance(found, OrderVector):
             found = self._held_against_others(found)
         self.refusals.note(found if isinstance(found, Refusal) else None)
@@ -121,6 +120,21 @@ class Demodulator:
             self.left_out += end
             return None, end
         return (zero_ns + round(found.time * NANOSECONDS), found), end
+
+    def _found(
+        self, at: Turning, values: FloatArray, said: FloatArray, until: float,
+        track: SpeedTrack,
+    ) -> OrderVector | Refusal:
+        """Return the vector of a stretch, if its axes and unit are those of the machine."""
+        peaks = self._axes.peaks(values, said)
+        along = self._axes.along(values, said, seconds=until - float(at.time[0]))
+        self.refusals.gravity = self._axes.words()
+        if isinstance(along, Refusal):
+            return along
+        finding = Finding(Stretch(at, along, peaks, until, self._turns, self._pickup), track)
+        found = finding.vector()
+        self.refusals.left_out.update(finding.left_out)
+        return found
 
     def _held_against_others(self, found: OrderVector) -> OrderVector | Refusal:
         """Return a vector with what its neighbours say of its error, which may be all of it."""

@@ -10,6 +10,11 @@ _FEWEST = 3  # one refused stretch is no news
 _TOLD_SHARE = 0.2
 
 
+# What gravity, in the mean of three axes, says of them.
+SEEN = 'gravity seen: unit and vertical are right, a turn about z cannot be seen'
+NOT_SEEN = 'gravity not seen: units and axes cannot be checked'
+
+
 class Flaw(StrEnum):
     """What keeps a stretch of samples, or an order in it, from becoming a vector."""
 
@@ -24,6 +29,8 @@ class Flaw(StrEnum):
     SPIKES = 'spikes'
     JUMP = 'jump'
     TURNED = 'turned'
+    AXES = 'axes'
+    UNITS = 'units'
     UNSOLVED = 'unsolved'
     NOISE = 'below_noise'
 
@@ -46,6 +53,7 @@ class Refusals:
         self.stretches = 0
         self.counts: Counter[Flaw] = Counter()
         self.left_out: Counter[str] = Counter()
+        self.gravity = ''  # what it says, once it is known
         self._texts: dict[Flaw, str] = {}
         self._latest: deque[Flaw | None] = deque(maxlen=_LATEST)
         self._told: Flaw | None = None
@@ -64,6 +72,8 @@ class Refusals:
             yield f'{count} of {self.stretches} stretches refused: {self._texts[flaw]}'
         for text, count in sorted(self.left_out.items()):
             yield f'{text} ({count} times)'
+        if self.gravity == NOT_SEEN:
+            yield self.gravity
 
     def prevailing(self) -> str:
         """Return why more than a fifth of the latest stretches were refused; empty if not."""
@@ -87,6 +97,8 @@ class Refusals:
         found |= {f'refused_{flaw}': count for flaw, count in sorted(self.counts.items())}
         if self.counts:
             found['refused_because'] = self._texts[self.counts.most_common(1)[0][0]]
+        if self.gravity:
+            found['gravity'] = self.gravity
         return found
 
     def _prevailing(self) -> Flaw | None:

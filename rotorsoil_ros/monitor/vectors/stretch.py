@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, FloatArray
+from rotorsoil_ros.case.entries.sensors import Pickup
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.monitor.vectors.orders import (
     deviations,
@@ -37,6 +38,9 @@ _FITTED_BELOW, _TOLD_BELOW = 0.45, 0.40
 # Harmonics up to this one may lie above half the rate and look like another order.
 _HIGHEST_IMAGE = 10
 
+# A sensor that feels so much of its range has felt more.
+_RANGE_USED = 0.98
+
 _SPIKES_PER_TURN = 1.0 / 3.0  # that may be left out
 
 # Multiples of its standard error below which a vector is noise.
@@ -56,20 +60,23 @@ class Stretch:
         When the samples were taken, and where the rotor was.
     values : (n,) float array
         Acceleration [m/s^2].
+    peaks : (n,) float array
+        The largest that the sensor felt with each, along any axis that counts [m/s^2].
     until : float
         Where the next stretch begins [s].
     turns : float
         How many turns make a stretch.
-    has_filter : bool
-        Whether nothing above half the sample rate can be in the values.
+    pickup : Pickup
+        What is known of the sensor.
 
     """
 
     at: Turning
     values: FloatArray
+    peaks: FloatArray
     until: float
     turns: float
-    has_filter: bool = False
+    pickup: Pickup
 
 
 class Finding:
@@ -77,7 +84,7 @@ class Finding:
 
     def __init__(self, stretch: Stretch, track: SpeedTrack) -> None:
         self._stretch, self._track = stretch, track
-        self._at, self._values = stretch.at, stretch.values
+        self._at, self._values, self._peaks = stretch.at, stretch.values, stretch.peaks
         self._turn_rate = self._at.turns / max(float(np.ptp(stretch.at.time)), _TINY)
         self._most = int(stretch.turns * _SPIKES_PER_TURN)
         self._spikes = 0
@@ -96,6 +103,8 @@ class Finding:
         found = examine(self._values, taken, turn_rate=turn_rate, turns=stretch.turns)
         if isinstance(found, Refusal):
             return found
+        if (peak := float(self._peaks.max())) >= _RANGE_USED * stretch.pickup.range:
+            return Refusal(Flaw.CLIPPED, f'clipped at {peak:.4g} m/s^2')
         if flaw := self._of_rate(found.rate):
             return flaw
         try:
@@ -107,6 +116,7 @@ class Finding:
         """Leave spikes out."""
         if number := int(np.count_nonzero(out)):
             self._at, self._values = self._at.rows(~out), self._values[~out]
+            self._peaks = self._peaks[~out]
             self._spikes += number
 
     def _of_rate(self, rate: float) -> Refusal | None:
@@ -120,7 +130,7 @@ class Finding:
         return None
 
     def _image(self, order: int, rate: float) -> int | None:
-        return None if self._stretch.has_filter else image(
+        return None if self._stretch.pickup.has_filter else image(
             order, rate=rate, turn_rate=self._turn_rate, turns=self._stretch.turns,
             highest=_HIGHEST_IMAGE)
 

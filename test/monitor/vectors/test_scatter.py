@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rotorsoil_ros.case.entries.sensors import Pickup
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Samples
 from rotorsoil_ros.monitor.vectors.demodulation import Demodulator, Scatter, WIDENED
@@ -71,7 +72,7 @@ def test_a_tone_beside_1x_is_not_seen_in_a_stretch_but_from_stretch_to_stretch(t
         np.cos(speed * time) + tone * np.cos(0.98 * speed * time)) + noise
     history = History()
     history.add(stamps, np.full(len(time), speed), np.mod(speed * time, 2.0 * np.pi))
-    demodulator = Demodulator('fan', X, history, turns=10.0)
+    demodulator = Demodulator('fan', X, history, turns=10.0, pickup=Pickup())
     demodulator.take(Samples('fan', X, stamps, values, False))
     [found] = demodulator.vectors()
     assert len(found.stamp_ns) > 50

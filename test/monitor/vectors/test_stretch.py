@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorsoil_ros.case.entries.sensors import Pickup
 from rotorsoil_ros.monitor.vectors.orders import deviations, fit, SpeedTrack, Turning
 from rotorsoil_ros.monitor.vectors.refusal import Flaw
 from rotorsoil_ros.monitor.vectors.stretch import Finding, Stretch
@@ -28,13 +29,14 @@ def signal(frequency, rate, amplitude, *, seed=0, noise=0.02, extra=()):
         np.linspace(0.0, 20.0 / frequency, 40), np.full(40, omega), angle_at_start=0.0)
 
 
-def found_in(time, values, track, *, has_filter=True):
+def found_in(time, values, track, *, has_filter=True, **pickup):
     order = np.lexsort((values, time))
     time, values = time[order], values[order]
     at = Turning.of(time, track)
     end = int(np.argmax(at.angle - at.angle[0] >= TURNS * 2.0 * np.pi))
-    finding = Finding(Stretch(at.rows(slice(0, end)), values[:end], float(time[end]), TURNS,
-                              has_filter), track)
+    finding = Finding(Stretch(at.rows(slice(0, end)), values[:end], np.abs(values[:end]),
+                              float(time[end]), TURNS, Pickup(has_filter=has_filter, **pickup)),
+                      track)
     return finding.vector(), finding.left_out
 
 
@@ -66,6 +68,17 @@ def test_sound_samples_are_kept(family):
     seen = outcome(FAMILIES[family], RECORDS, seed=1)
     assert sum(seen.flaws.values()) <= 0.06 * RECORDS
     assert seen.missed <= (0.06 if 'lost' in family else 0.0)  # aliases of lossy samples
+
+
+@pytest.mark.parametrize('share, is_kept', [(0.97, True), (0.985, False), (1.2, False)])
+def test_range_that_the_case_states_is_where_a_sensor_clips(share, is_kept):
+    time, values, track = signal(25.0, 1000.0, 80e-6)
+    found, _ = found_in(time, values, track, range=float(values[:400].max()) / share)
+    if is_kept:
+        assert abs(found.displacement[0]) == pytest.approx(80e-6, rel=2e-3)
+    else:
+        assert found.flaw == Flaw.CLIPPED
+        assert f'clipped at {values[:400].max():.4g} m/s^2' in found.text
 
 
 @pytest.mark.parametrize('factor', [1.05, 1.2, 1.5, 2.0])
