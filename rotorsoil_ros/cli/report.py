@@ -33,7 +33,7 @@ from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.damping import DampingSplitter
+from rotorsoil_ros.machine.damping import DampingSplitter, LARGEST_DAMPING_RATIO
 from rotorsoil_ros.machine.modes.critical import asked, critical_speeds
 from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.modes.stability import Stability, stability
@@ -192,7 +192,8 @@ def _criticals(
     wanted = low, asked(high)[1]
     span = model.within_tables(wanted)
     names, lines = ModeNames(model), []
-    criticals = critical_speeds(model, span)
+    found = critical_speeds(model, span)
+    criticals = [one for one in found if abs(one.damping_ratio) <= LARGEST_DAMPING_RATIO]
     for critical, split in zip(criticals, DampingSplitter(model).of_modes(criticals),
                                strict=True):
         how = [f'{"forward" if critical.whirl > 0 else "backward"}',
@@ -206,6 +207,9 @@ def _criticals(
                        + (f'{asks:.0%} is asked' if asks else 'no margin is asked'))
         lines.append((f'critical speed {units.speed(critical.speed)}',
                       f'{", ".join(how)}, {names.of_critical(critical)}'))
+    if len(criticals) < len(found):
+        lines.append(('critical speeds left out', f'{len(found) - len(criticals)} of vibrations '
+                      f'with a damping ratio above {LARGEST_DAMPING_RATIO:g}, which hardly swing'))
     if not lines:
         lines.append(('critical speeds', f'none from {units.speed(span[0])} up to '
                                          f'{units.speed(span[1])}'))

@@ -21,6 +21,9 @@ DAMPERS = (BEARINGS, PEDESTALS, RADIATION, MATERIAL, SOIL)
 # Above, a mode hardly swings before it is gone, and shares of its decay mean nothing.
 LARGEST_DAMPING_RATIO = 0.7
 
+# A share of less is nothing: round-off and the fit of the ground.
+_NOTHING = 0.01
+
 
 @dataclass(frozen=True)
 class DampingSplit:
@@ -147,7 +150,9 @@ class DampingSplitter:
         pairs = (len(speed), len(model.rotor.bearings), 2, 2)
         journal, housing = np.moveaxis(found.displacement[:, :seats].reshape(pairs), 2, 0)
         through = found.force[:, :seats].reshape(pairs)[:, :, 0]
-        blocks = slice(len(model.channels) - 6 * len(model.foundations), None)
+        names = {block.name for block in model.foundations}
+        blocks = [index for index, channel in enumerate(model.channels)
+                  if channel.station in names]
         motion, into_soil = found.displacement[:, blocks], found.force[:, blocks]
         flat = (len(speed), 2 * len(model.rotor.bearings))
         seat = motion @ support.block_rows.T
@@ -160,7 +165,12 @@ class DampingSplitter:
             journal - housing, through, deflection, below, motion, into_soil, radiated))
 
     def of_modes(self, criticals: Sequence[CriticalSpeed]) -> list[DampingSplit | None]:
-        """Divide the decay of the mode at every critical speed; None where it hardly swings."""
+        """
+        Divide the decay of the mode at every critical speed.
+
+        None where it hardly swings, and where a passive part would give instead of take: so far
+        from the real frequencies at which the ground was solved its continuation is not known.
+        """
         swinging = [one for one in criticals
                     if abs(one.damping_ratio) <= LARGEST_DAMPING_RATIO]
         if not swinging:
@@ -181,7 +191,8 @@ class DampingSplitter:
                 size = continued.size[:blocks]
                 compliance = (size[:, None] * size
                               * continued(np.array([w]))[:, :blocks, :blocks])
-            found.append(self._of_mode(one, w, compliance))
+            split = self._of_mode(one, w, compliance)
+            found.append(split if _is_passive(split) else None)
         return found
 
     def _of_mode(
@@ -216,6 +227,12 @@ class DampingSplitter:
             return np.concatenate([films, springs, soil], axis=1)
         waves = (motion.conj() * radiated).imag.reshape(rows, -1, 6).sum(axis=2)
         return np.concatenate([films, springs, waves, soil - waves], axis=1)
+
+
+def _is_passive(split: DampingSplit) -> bool:
+    """Return whether soil and its material only take; bearings may give."""
+    taken = [split.share(kind) for kind in split.kinds if kind in (RADIATION, MATERIAL, SOIL)]
+    return all(share[0] >= -_NOTHING for share in taken if math.isfinite(share[0]))
 
 
 def _pushed(compliance: ComplexArray, motion: ComplexArray) -> ComplexArray:

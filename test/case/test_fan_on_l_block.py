@@ -20,6 +20,7 @@ from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.plan import Plan
+from rotorsoil_ros.machine.damping import DampingSplitter, MATERIAL, RADIATION
 
 CONFIG = Path(__file__).parents[2] / 'config'
 ELL, FAN = CONFIG / 'fan_on_l_block.yaml', CONFIG / 'plant_fan.yaml'
@@ -213,3 +214,24 @@ def test_check_tells_coupling_and_probes(cache, capsys):
     assert 'boundary elements of this plan: within 1%' in said
     assert 'yard: on the ground' in said
     assert 'taken as alone' not in said
+
+
+def test_energy_closes_where_points_of_the_ground_are_channels_too(machine):
+    split = machine.damping_split(rpm=[900.0, 1500.0])
+    found = machine.response(rpm=[900.0, 1500.0])
+    planes = [list(map(str, found.channels)).index(f'wheel_{axis}') for axis in 'xz']
+    moment = machine.case.unbalance[list(machine.model.planes).index('wheel')]
+    # Unbalance turns from z towards x: its force on x lags that on z by a quarter of a turn.
+    force = found.speed[:, None] ** 2 * moment * np.array([-1j, 1.0])
+    put_in = math.pi * (force.conj() * found.displacement[:, planes]).imag.sum(axis=1)
+    np.testing.assert_allclose(split.total, put_in, rtol=1e-9)
+
+
+def test_no_mode_is_divided_into_parts_that_give(machine):
+    criticals = machine.critical_speeds()
+    splits = DampingSplitter(machine.model).of_modes(criticals)
+    told = [split for split in splits if split is not None]
+    assert told
+    for split in told:
+        assert split.share(RADIATION)[0] > -0.01
+        assert split.share(MATERIAL)[0] > -0.01

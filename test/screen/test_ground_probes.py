@@ -2,6 +2,10 @@
 
 from pathlib import Path
 
+import pytest
+
+pytest.importorskip('rerun', reason='rerun-sdk is optional')
+
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.screen.channels import PROBES, trends
