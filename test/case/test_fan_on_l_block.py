@@ -223,7 +223,7 @@ def test_energy_closes_where_points_of_the_ground_are_channels_too(machine):
     moment = machine.case.unbalance[list(machine.model.planes).index('wheel')]
     # Unbalance turns from z towards x: its force on x lags that on z by a quarter of a turn.
     force = found.speed[:, None] ** 2 * moment * np.array([-1j, 1.0])
-    put_in = math.pi * (force.conj() * found.displacement[:, planes]).imag.sum(axis=1)
+    put_in = math.pi * (found.displacement[:, planes].conj() * force).imag.sum(axis=1)
     np.testing.assert_allclose(split.total, put_in, rtol=1e-9)
 
 
