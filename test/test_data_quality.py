@@ -63,6 +63,19 @@ def test_bunched_stamps_are_a_warning_that_says_why(fan, tmp_path):
     assert not {topic for topic in topics if topic.endswith(('residual', 'demodulated/amplitude'))}
 
 
+def test_bunched_stamps_that_the_case_states_are_amplitudes(fan):
+    """The truth that was put in: 1.14 mm/s rms; nobody knows the phase."""
+    found = compare(BUNCHED, fan.case.changed(['sensors.stamps=packets']),
+                    cache_directory=fan.directory)
+    [zone] = [entry for entry in found.zones if entry.source == 'measured']
+    assert zone.zone == 'A'
+    assert 1e3 * zone.velocity == pytest.approx(1.14, abs=0.02)
+    [points] = found.points
+    assert len(points.stamp_ns) >= 13
+    np.testing.assert_allclose(points.amplitude, 10.37e-6, rtol=0.03)
+    assert np.isnan(points.phase).all()
+
+
 def messages(rows):
     """Return the bytes of every message, those between its numbers too."""
     return [bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]
@@ -194,6 +207,7 @@ def test_orientation_that_the_case_uses_gives_the_truth(fan, tmp_path):
                            'none of that'),
     ('sensors.units=mm', "sensors.units: must be 'm/s^2' or 'g', got 'mm'"),
     ('sensors.orientation=true', "sensors.orientation: must be 'use', got True"),
+    ('sensors.stamps=late', "sensors.stamps: must be 'packets', got 'late'"),
     ('sensors.rnge=5', 'sensors.rnge: is not a known key; did you mean range?'),
     ('sensors.channels.drive_end_hosing_x.range=5', 'sensors.channels.drive_end_hosing_x: is '
      'not a channel of this machine; did you mean drive_end_housing_x?'),

@@ -244,6 +244,7 @@ class PickupEntry(Entry):
     range: MetrePerSecondSquared | None = None
     units: Literal['m/s^2', 'g'] | None = None
     orientation: Literal['use'] | None = None
+    stamps: Literal['packets'] | None = None
     anti_alias: StrictBool | None = None
 
 

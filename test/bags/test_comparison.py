@@ -129,6 +129,44 @@ def test_live_and_compare_refuse_the_same_axes(answered, fan, tmp_path, tick_ns)
     assert monitor.judge.account.failures() == offline.failures
 
 
+@pytest.mark.parametrize('apart_ns', [0, 2000])
+def test_live_and_compare_find_the_same_amplitudes_in_packets(answered, fan, tmp_path, apart_ns):
+    log = packed(answered, tmp_path / 'log.mcap', apart_ns)
+    case = fan.case.changed(['sensors.stamps=packets'])
+    offline = compare(log, case, cache_directory=fan.directory)
+    _, _, collector = live(log, fan, tick_ns=370_000_000, judging=Judging.of(case))
+    [true] = [points for points in compare(answered, cache_directory=fan.directory).points
+              if points.channel == 'fan_end_housing_x']
+    [points], [found] = offline.points, collector.points()
+    assert len(points.stamp_ns) > 0.8 * len(true.stamp_ns)
+    assert np.isnan(points.phase).all()
+    for name in ('stamp_ns', 'amplitude', 'reason'):
+        np.testing.assert_array_equal(getattr(found, name), getattr(points, name), err_msg=name)
+    steady = np.abs(np.gradient(true.amplitude)) < 0.02 * true.amplitude
+    np.testing.assert_allclose(np.interp(true.stamp_ns, points.stamp_ns, points.amplitude)[steady],
+                               true.amplitude[steady], rtol=0.05)
+
+
+def packed(answered, path, apart_ns):
+    """Write speeds and one sensor of a log, its samples eight at a time."""
+    with LogFile(path) as log:
+        for batch in bag_reader.batches(
+                answered, lambda topic, _: topic.endswith(('fan_end_housing_x/imu', 'states')),
+                at_most=512):
+            if not batch.topic.endswith('imu'):
+                log.write(batch)
+                continue
+            layout = Layout.of(IMU, batch.payloads[0])
+            rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
+            number = np.arange(len(rows))
+            stamps = np.array(batch.log_time_ns)[np.minimum(
+                number // 8 * 8 + 7, len(rows) - 1)] + apart_ns * (number % 8 - 7)
+            rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, SECOND)
+            log.write(Records(batch.topic, IMU, stamps.tolist(), [
+                bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]))
+    return path
+
+
 def tilted(answered, path):
     """Write speeds and one sensor of a log, turned by a quarter about y, and in g."""
     with LogFile(path) as log:

@@ -23,6 +23,8 @@ class Pickup:
         In which its messages are, `m/s^2` or `g`; empty where nobody says.
     has_orientation : bool
         Whether the `orientation` of its messages turns its axes into those of the machine.
+    comes_in_packets : bool
+        Whether stamps tell when a packet of samples came, the last one taken just then.
     has_filter : bool
         Whether a filter before its converter lets nothing above half its rate pass.
 
@@ -31,6 +33,7 @@ class Pickup:
     range: float = math.inf
     units: str = ''
     has_orientation: bool = False
+    comes_in_packets: bool = False
     has_filter: bool = False
 
     def __post_init__(self) -> None:
@@ -40,7 +43,7 @@ class Pickup:
     def of(cls, entry: PickupEntry) -> 'Pickup':
         """Return what an entry says."""
         return cls(math.inf if entry.range is None else entry.range, entry.units or '',
-                   entry.orientation == 'use', entry.anti_alias is True)
+                   entry.orientation == 'use', entry.stamps == 'packets', entry.anti_alias is True)
 
 
 @dataclass(frozen=True, slots=True)

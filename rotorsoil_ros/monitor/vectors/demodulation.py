@@ -20,6 +20,7 @@ from rotorsoil_ros.monitor.vectors.orders import (
     Turning,
 )
 from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
+from rotorsoil_ros.monitor.vectors.sampling import end_of_packet, unpacked
 from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE, Finding, Stretch, TOLD
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
@@ -31,6 +32,10 @@ _LOOKED_AT, _FEWEST, _LARGEST_RATIO = 11, 6, 3.0
 
 # A speed that has moved by this share is another one.
 _ONE_SPEED = 0.005
+
+# Standard error that spreading a packet adds to an amplitude, as a share of it: nine in ten are
+# off by less than 1.7 %.
+_OF_PACKETS = 0.0105
 
 WIDENED = f'vectors scatter over {_LARGEST_RATIO:g} times more than each says: wider'
 
@@ -89,9 +94,13 @@ class Demodulator:
                   & (np.abs(values) <= LARGEST_ACCELERATION))
         self.left_out += len(stamps) - int(np.count_nonzero(chosen))
         stamps, values, said = stamps[chosen], values[chosen], said[chosen]
-        # By value where stamps are equal: a log may hold such samples in another order.
-        order = np.lexsort((values, stamps))
+        # By value where stamps are equal: a log may hold such samples in another order. Of a
+        # packet with one stamp nothing but the order in which they came tells more.
+        packets = self._pickup.comes_in_packets
+        order = np.argsort(stamps, kind='stable') if packets else np.lexsort((values, stamps))
         stamps, values, said = stamps[order], values[order], said[order]
+        if packets:
+            return stamps, values, said
         again = np.concatenate([[False], (np.diff(stamps) == 0) & (np.diff(values) == 0.0)])
         if again.any():
             self.refusals.left_out['samples told twice'] += int(np.count_nonzero(again))
@@ -109,6 +118,8 @@ class Demodulator:
         time = (stamps - zero_ns) / NANOSECONDS
         at = Turning.of(time, track)
         end = int(np.argmax(at.angle - at.angle[0] >= self._turns * RADIANS_PER_TURN))
+        if self._pickup.comes_in_packets:
+            end = end_of_packet(time, end)
         if not end:
             return None, 0
         found = self._found(at.rows(slice(0, end)), values[:end], said[:end], float(time[end]),
@@ -126,6 +137,12 @@ class Demodulator:
         track: SpeedTrack,
     ) -> OrderVector | Refusal:
         """Return the vector of a stretch, if its axes and unit are those of the machine."""
+        if self._pickup.comes_in_packets:
+            first, taken = unpacked(at.time)
+            if not len(taken):
+                return Refusal(Flaw.PACKETS, 'a single packet in the stretch')
+            at, until = Turning.of(taken, track), float(taken[-1])
+            values, said = values[first:], said[first:]
         peaks = self._axes.peaks(values, said)
         along = self._axes.along(values, said, seconds=until - float(at.time[0]))
         self.refusals.gravity = self._axes.words()
@@ -134,6 +151,9 @@ class Demodulator:
         finding = Finding(Stretch(at, along, peaks, until, self._turns, self._pickup), track)
         found = finding.vector()
         self.refusals.left_out.update(finding.left_out)
+        if isinstance(found, OrderVector) and self._pickup.comes_in_packets:
+            return replace(found, has_phase=False, deviation=np.hypot(
+                found.deviation, _OF_PACKETS * np.abs(found.displacement)))
         return found
 
     def _held_against_others(self, found: OrderVector) -> OrderVector | Refusal:

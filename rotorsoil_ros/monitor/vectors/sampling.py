@@ -102,6 +102,41 @@ def sampling(
                     is_ordered=bool(np.mean(spacing < _CLOSE * mean) <= _BY_CHANCE))
 
 
+def end_of_packet(time: FloatArray, end: int) -> int:
+    """Return where the packet ends that a stretch ends in, 0 while that has not come."""
+    if not end:
+        return 0
+    apart = _TOGETHER * float(time[end - 1] - time[0]) / max(end - 1, 1)
+    ends = np.flatnonzero(np.diff(time[end - 1:]) >= apart)
+    return end + int(ends[0]) if len(ends) else 0
+
+
+def unpacked(time: FloatArray) -> tuple[int, FloatArray]:
+    """
+    Return when samples of packets were taken, of an even sensor whose last one came at once.
+
+    Parameters
+    ----------
+    time : (n,) float array
+        Stamps in the order in which the samples came, up to the end of a packet [s].
+
+    Returns
+    -------
+    int
+        How many samples the first packet has: since when it gathered them is not told.
+    (m,) float array
+        When each of the others was taken [s].
+
+    """
+    spacing = np.diff(time)
+    apart = _TOGETHER * float(time[-1] - time[0]) / max(len(spacing), 1)
+    last = np.flatnonzero(np.append(spacing >= apart, True))
+    arrival, sizes = time[last], np.diff(last)
+    number = np.arange(last[0] + 1, len(time)) - np.repeat(last[:-1], sizes)
+    return int(last[0]) + 1, np.repeat(arrival[:-1], sizes) + number * np.repeat(
+        np.diff(arrival) / sizes, sizes)
+
+
 def _step_of_lost(spacing: FloatArray) -> float | None:
     """Return the step of an even grid of which samples are missing; None if there is none."""
     short = float(np.quantile(spacing, 0.1))

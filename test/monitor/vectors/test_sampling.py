@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal
-from rotorsoil_ros.monitor.vectors.sampling import even_grids, image, sampling
+from rotorsoil_ros.monitor.vectors.sampling import (
+    end_of_packet,
+    even_grids,
+    image,
+    sampling,
+    unpacked,
+)
 
 RATE = 1000.0
 EVEN = np.arange(400) / RATE
@@ -73,3 +79,35 @@ def test_image_is_the_harmonic_that_has_the_same_samples():
     other = image(1, rate=200.0, turn_rate=25.0, turns=10.0, highest=10)
     np.testing.assert_allclose(np.cos(other * turn), np.cos(turn), atol=1e-12)
     assert image(1, rate=300.0, turn_rate=25.0, turns=10.0, highest=10) is None  # 12 a turn
+
+
+def packed(time, size, *, apart=0.0):
+    """Return the stamps of packets whose last sample comes as it is taken."""
+    number = np.arange(len(time))
+    last = np.minimum(number // size * size + size - 1, len(time) - 1)
+    return time[last] + apart * (number % size - size + 1)
+
+
+@pytest.mark.parametrize('apart', [0.0, 2e-6])
+@pytest.mark.parametrize('size', [1, 4, 16])
+def test_samples_of_packets_lie_evenly_between_arrivals(size, apart):
+    time = np.arange(160) / 800.0
+    first, taken = unpacked(packed(time, size, apart=apart))
+    assert first == size
+    np.testing.assert_allclose(taken, time[size:], atol=1e-12)
+
+
+def test_packets_that_differ_in_size_are_spread_each_for_itself():
+    time = np.arange(60) / 800.0
+    stamps = np.repeat(time[[9, 29, 34, 59]], [10, 20, 5, 25])
+    first, taken = unpacked(stamps)
+    assert first == 10
+    np.testing.assert_allclose(taken, time[10:], atol=1e-12)
+
+
+def test_a_stretch_ends_with_a_packet_that_is_there():
+    stamps = packed(np.arange(64) / 800.0, 16, apart=2e-6)
+    assert end_of_packet(stamps, 32) == 32
+    assert end_of_packet(stamps, 33) == end_of_packet(stamps, 47) == 48
+    assert end_of_packet(stamps, 49) == 0  # who knows whether more of it comes
+    assert end_of_packet(stamps, 0) == 0
