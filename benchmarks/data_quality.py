@@ -253,7 +253,7 @@ def cost() -> None:
     """Print what a vector costs, with its gates and without."""
     made = find(record(np.random.default_rng(1), frequency=25.0, rate=1010.0, plain=True))[1]
     stretch = Stretch(Turning.of(made.time, made.track), made.values,
-                      float(made.time[-1] + made.step), TURNS)
+                      np.abs(made.values), float(made.time[-1] + made.step), TURNS, Pickup())
     for name, run in (
             ('with gates', lambda: Finding(stretch, made.track).vector()),
             ('fit alone', lambda: demodulate(made.time, made.values, made.track))):

@@ -208,6 +208,9 @@ def test_orientation_that_the_case_uses_gives_the_truth(fan, tmp_path):
     ('sensors.units=mm', "sensors.units: must be 'm/s^2' or 'g', got 'mm'"),
     ('sensors.orientation=true', "sensors.orientation: must be 'use', got True"),
     ('sensors.stamps=late', "sensors.stamps: must be 'packets', got 'late'"),
+    ('sensors.channels=[1]', 'sensors.channels: must hold keys and values, got [1]'),
+    ('sensors.channels={X: {}}', 'sensors.channels.X: must be a name of at most 64 small letters, '
+     "digits and _, first a letter, got 'X'"),
     ('sensors.rnge=5', 'sensors.rnge: is not a known key; did you mean range?'),
     ('sensors.channels.drive_end_hosing_x.range=5', 'sensors.channels.drive_end_hosing_x: is '
      'not a channel of this machine; did you mean drive_end_housing_x?'),

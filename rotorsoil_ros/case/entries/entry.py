@@ -14,11 +14,13 @@ from rotorsoil_ros.case.document import shown
 CONSTANT, TABLE, NUMBER, AXES = '<constant>', '<table>', '<number>', '<axes>'
 KEYS, WORD = '<keys>', '<word>'
 EVEN, LAYERED = '<even>', '<layered>'
-_SHAPES = (CONSTANT, TABLE, NUMBER, AXES, KEYS, WORD, EVEN, LAYERED)
+_REFUSED_KEY = '[key]'  # where pydantic refuses a key itself
+_SHAPES = (CONSTANT, TABLE, NUMBER, AXES, KEYS, WORD, EVEN, LAYERED, _REFUSED_KEY)
 
 _WHAT = {
     'missing': 'is missing',
     'model_type': 'must hold keys and values, got {input}',
+    'dict_type': 'must hold keys and values, got {input}',
     'list_type': 'must be a list, got {input}',
     'tuple_type': 'must be a list, got {input}',
     'too_long': 'has more entries than it should: {input}',

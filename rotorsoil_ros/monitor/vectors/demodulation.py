@@ -33,8 +33,8 @@ _LOOKED_AT, _FEWEST, _LARGEST_RATIO = 11, 6, 3.0
 # A speed that has moved by this share is another one.
 _ONE_SPEED = 0.005
 
-# Standard error that spreading a packet adds to an amplitude, as a share of it: nine in ten are
-# off by less than 1.7 %.
+# Standard error that spreading packets adds to an amplitude, as a share of it: transport of
+# less than a millisecond.
 _OF_PACKETS = 0.0105
 
 WIDENED = f'vectors scatter over {_LARGEST_RATIO:g} times more than each says: wider'
