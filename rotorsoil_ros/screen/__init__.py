@@ -15,14 +15,17 @@ if TYPE_CHECKING:
 
 def recorder(path: Path, machine: Machine) -> 'Callable[[str], RerunSink]':
     """Return what opens a recording of a machine under the name that it is given."""
-    return lambda name: open_viewer(path, {name: machine})
+    return lambda name: open_viewer(path, {name: machine}, ends=True)
 
 
 def open_viewer(
-    recording: Path | None, machines: Mapping[str, Machine], *, url: str = '',
+    recording: Path | None, machines: Mapping[str, Machine], *, url: str = '', ends: bool = False,
 ) -> 'RerunSink':
     """
     Open a recording, or a connection to a viewer, or both.
+
+    One that `ends`, as that of a recorded run does, has a footer, by which programs find their
+    way in it; a node's has none, so that its memory does not grow.
 
     Raises
     ------
@@ -32,7 +35,7 @@ def open_viewer(
     """
     if find_spec('rerun') is None:
         raise InputError('rerun-sdk is not installed: nothing is recorded for its viewer')
-    # It warns of a missing footer, which is missing so that memory does not grow.
+    # It warns of a missing footer.
     os.environ.setdefault('RUST_LOG', 'error')
     from rotorsoil_ros.screen.viewer import RerunSink
-    return RerunSink(recording, machines, url=url)
+    return RerunSink(recording, machines, url=url, ends=ends)

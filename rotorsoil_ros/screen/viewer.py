@@ -47,9 +47,10 @@ class RerunSink:
 
     def __init__(
         self, path: Path | None, machines: Mapping[str, Machine], *, url: str = '',
+        ends: bool = False,
     ) -> None:
         self._stream = rr.RecordingStream(APPLICATION)
-        self._machines, self._url = machines, url
+        self._machines, self._url, self._ends = machines, url, ends
         self._shown = {name: Shown(name, machine.case,
                                    trends(name, machine.case, machine.table.channels),
                                    Scene(machine.case, machine.table.channels))
@@ -65,8 +66,8 @@ class RerunSink:
         # The stream stays: rerun never frees one, nor its two threads.
         for view in self._views.values():
             view.flush()
-        # A footer would keep two kilobytes in memory for every chunk until the end.
-        file = [rr.FileSink(path, write_footer=False)] if path else []
+        # A footer keeps two kilobytes in memory for every chunk until the end: for ever in a node.
+        file = [rr.FileSink(path, write_footer=self._ends)] if path else []
         viewer = [rr.GrpcSink(self._url)] if self._url else []
         if not file and not viewer:  # the disk takes none yet: rerun would keep all in memory
             self._views = {}

@@ -1,5 +1,8 @@
 """The recording shows what an engineer looks for, at the time at which it happened."""
 
+from pathlib import Path
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -18,7 +21,7 @@ from rotorsoil_ros.events import (
 )
 from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
-from rotorsoil_ros.screen import open_viewer
+from rotorsoil_ros.screen import open_viewer, recorder
 
 from recordings import column, PERIOD, predicted, START
 
@@ -254,3 +257,14 @@ def test_a_new_recording_opens_with_the_models_that_it_rests_on(machine, tmp_pat
         sink.show([told, predicted(machine, np.full(3, 300.0))])
         sink.begin(tmp_path / 'b.rrd')
         assert [event for event, _ in sink._views['fan']._moments] == [told]
+
+
+def test_recording_of_a_run_is_whole_for_other_programs(machine, tmp_path):
+    pytest.importorskip('rerun', reason='rerun-sdk is optional')
+    with recorder(tmp_path / 'run.rrd', machine)('fan') as sink:
+        sink.show([Model('fan', START, machine.description('fan', machine.case.unbalance)),
+                   predicted(machine, np.full(3, 300.0))])
+    verified = subprocess.run(
+        [Path(sys.executable).with_name('rerun'), 'rrd', 'verify', tmp_path / 'run.rrd'],
+        capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stderr
