@@ -49,6 +49,14 @@ def measured(fan, tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope='module')
+def book(fan, measured):
+    """Return who has heard the run, and its minutes."""
+    found = Book(fan)
+    predict(fan, measured, None, listener=found)
+    return found, found.rows()
+
+
 def profile(path, *, rpm=(300.0, 1700.0), number=50):
     """Write a run-up of one speed a second."""
     write_speed_profile(path, 'fan', START + SECOND * np.arange(number),
@@ -76,21 +84,18 @@ def live(log, machine):
     return book.rows()
 
 
-def test_minutes_are_those_of_the_live_node_to_the_last_bit(fan, measured, tmp_path):
-    [record] = predict_many(fan, [measured], tmp_path, has_predictions=False,
-                            has_statistics=True)
-    assert record.failure == ''
-    assert repr(record.minutes) == repr(live(measured, fan))
-    assert {row.minute_ns for row in record.minutes} == {
+def test_minutes_are_those_of_the_live_node_to_the_last_bit(fan, measured, book):
+    _, rows = book
+    assert repr(rows) == repr(live(measured, fan))
+    assert {row.minute_ns for row in rows} == {
         (START + 60 * step * SECOND) // MINUTE_NS * MINUTE_NS for step in (0, 1)}
 
 
-def test_minutes_are_means_over_what_was_measured(fan, measured):
-    book = Book(fan)
-    predict(fan, measured, None, listener=book)
-    [points] = [each for each in book._points.points()
+def test_minutes_are_means_over_what_was_measured(book):
+    heard, told = book
+    [points] = [each for each in heard._points.points()
                 if each.channel == 'fan_end_housing_x']
-    rows = [row for row in book.rows() if row.channel == 'fan_end_housing_x']
+    rows = [row for row in told if row.channel == 'fan_end_housing_x']
     assert sum(row.vectors for row in rows) == len(points.speed)
     for row in rows:
         here = points.used & (points.stamp_ns // MINUTE_NS * MINUTE_NS == row.minute_ns)
@@ -102,10 +107,8 @@ def test_minutes_are_means_over_what_was_measured(fan, measured):
         assert row.speed_rad_s > 0.0
 
 
-def test_effective_ground_of_a_minute_is_what_was_put_in(fan, measured):
-    book = Book(fan)
-    predict(fan, measured, None, listener=book)
-    told = {row.minute_ns: (row.ground_factor, row.ground_factor_error) for row in book.rows()
+def test_effective_ground_of_a_minute_is_what_was_put_in(book):
+    told = {row.minute_ns: (row.ground_factor, row.ground_factor_error) for row in book[1]
             if math.isfinite(row.ground_factor)}
     assert told
     for factor, error in told.values():

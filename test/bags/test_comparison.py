@@ -68,10 +68,20 @@ def live(log, machine, *, tick_ns, judging=None):
     return monitor, events, collector
 
 
-@pytest.mark.parametrize('tick_ns', [1, 370_000_000])
-def test_live_and_compare_find_the_same(answered, fan, tick_ns):
-    offline = compare(answered, cache_directory=fan.directory)
-    monitor, _, collector = live(answered, fan, tick_ns=tick_ns)
+@pytest.fixture(scope='module')
+def offline(answered, fan):
+    """Return the comparison of the log: several tests read it."""
+    return compare(answered, cache_directory=fan.directory)
+
+
+@pytest.fixture(scope='module', params=[1, 370_000_000])
+def watched(request, answered, fan):
+    """Return monitor, events and collector of the log, heard as the node hears it."""
+    return live(answered, fan, tick_ns=request.param)
+
+
+def test_live_and_compare_find_the_same(offline, watched):
+    monitor, _, collector = watched
     account = monitor.judge.account
     assert account.peaks == offline.peaks
     assert account.peaks
@@ -130,14 +140,15 @@ def test_live_and_compare_refuse_the_same_axes(answered, fan, tmp_path, tick_ns)
 
 
 @pytest.mark.parametrize('apart_ns', [0, 2000])
-def test_live_and_compare_find_the_same_amplitudes_in_packets(answered, fan, tmp_path, apart_ns):
+def test_live_and_compare_find_the_same_amplitudes_in_packets(
+        answered, fan, offline, tmp_path, apart_ns):
     log = packed(answered, tmp_path / 'log.mcap', apart_ns)
     case = fan.case.changed(['sensors.stamps=packets'])
-    offline = compare(log, case, cache_directory=fan.directory)
+    spread = compare(log, case, cache_directory=fan.directory)
     _, _, collector = live(log, fan, tick_ns=370_000_000, judging=Judging.of(case))
-    [true] = [points for points in compare(answered, cache_directory=fan.directory).points
+    [true] = [points for points in offline.points
               if points.channel == 'fan_end_housing_x']
-    [points], [found] = offline.points, collector.points()
+    [points], [found] = spread.points, collector.points()
     assert len(points.stamp_ns) > 0.8 * len(true.stamp_ns)
     assert np.isnan(points.phase).all()
     for name in ('stamp_ns', 'amplitude', 'reason'):
@@ -221,21 +232,20 @@ def spoiled(answered, path):
     return path
 
 
-def test_no_peak_of_the_demonstration_is_missing(answered, fan):
+def test_no_peak_of_the_demonstration_is_missing(watched):
     """It peaks at 1070 rpm instead of 1310: not measured is neither."""
-    _, events, _ = live(answered, fan, tick_ns=1)
+    _, events, _ = watched
     said = [event.text for event in events if isinstance(event, Remark)]
     assert [text for text in said if 'from the predicted 13' in text]
     assert [text for text in said if 'was not measured' in text] == []
 
 
-def test_answers_in_the_log_are_those_of_the_comparison(answered, fan):
-    offline = compare(answered, cache_directory=fan.directory)
+def test_answers_in_the_log_are_those_of_the_comparison(answered, offline, watched):
     assert offline.run.title == 'fan, SYNTHETIC signals'
     assert not [line for line in offline.remarks if 'rest on another table' in line]
     logged = list(bag_reader.messages(
         answered, lambda topic, _: topic == '/rotorsoil/fan/residual'))
-    _, events, _ = live(answered, fan, tick_ns=1)
+    _, events, _ = watched
     assert len(logged) == sum(len(event.stamp_ns) for event in events
                               if isinstance(event, Compared))
 
@@ -332,8 +342,8 @@ def test_log_that_measures_nothing_is_refused(fan, tmp_path):
         compare(tmp_path / 'log.mcap', FAN, cache_directory=fan.directory)
 
 
-def test_every_measured_point_is_weighed_once(answered, fan):
-    _, events, _ = live(answered, fan, tick_ns=370_000_000)
+def test_every_measured_point_is_weighed_once(watched):
+    _, events, _ = watched
     compared = sum(len(event.stamp_ns) for event in events if isinstance(event, Compared))
     weighed = sum(len(event.rate) for event in events if isinstance(event, Weighed))
     assert compared == weighed > 300
