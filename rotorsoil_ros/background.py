@@ -1,6 +1,6 @@
 """What is slow or may hang works aside, so that no answer waits for it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import logging
@@ -9,7 +9,7 @@ import queue
 import subprocess
 import sys
 import threading
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from rotorsoil_ros.errors import BAD_INPUT, RotorSoilError
 
@@ -21,6 +21,15 @@ PATIENCE_S = 2.0  # at the end
 OPENING_S = 5.0  # that a start waits for what hangs
 GLANCE_S = 0.002  # at a child whose pipe has to be emptied
 NICE = 10  # how far a child stands back behind answers
+
+
+class Mapper(Protocol[Item, Result]):
+    """What calls a function on each of some jobs: `map` itself, or that of any executor."""
+
+    def __call__(
+        self, function: Callable[[Item], Result], jobs: Iterable[Item], /,
+    ) -> Iterable[Result]:
+        """Return what it gave, in the order of the jobs."""
 
 
 class Aside(Generic[Item]):

@@ -1,6 +1,6 @@
 """Years of recorded runs, answered by whatever has processors: one record for every bag."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 import hashlib
@@ -8,8 +8,9 @@ import json
 import os
 from pathlib import Path
 import pickle
-from typing import Any, get_type_hints, Protocol
+from typing import Any, get_type_hints
 
+from rotorsoil_ros.background import Mapper
 from rotorsoil_ros.bags.metadata import files
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.tables.files import opened
@@ -22,15 +23,6 @@ from rotorsoil_ros.monitor.minutes import ground_by_minute, Minute, Minutes
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.points import ChannelPoints, Collector
 from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
-
-
-class Mapper(Protocol):
-    """What calls a function on each of some jobs: `map` itself, or that of any executor."""
-
-    def __call__(
-        self, function: Callable[['Job'], 'Record'], jobs: Iterable['Job'], /,
-    ) -> Iterable['Record']:
-        """Return what it gave, in the order of the jobs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +119,7 @@ class Job:
 
 def predict_many(
     case: Machine | Path | str, bags: Sequence[Path | str], out: Path | str, *,
-    map: Mapper = map,  # noqa: A002, as every executor calls it
+    map: Mapper['Job', Record] = map,  # noqa: A002, as every executor calls it
     has_predictions: bool = True, has_statistics: bool = False, speed: SpeedSource = USUAL,
     cache_directory: Path | None = None,
 ) -> Iterator[Record]:

@@ -6,13 +6,14 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Any
 
-from rotorsoil_ros.bags.archive import Job, Mapper, Record
+from rotorsoil_ros.background import Mapper
+from rotorsoil_ros.bags.archive import Job, Record
 from rotorsoil_ros.errors import InputError
 
 Answers = Callable[[Job], Record]
 
 
-def processes(number: int) -> Mapper:
+def processes(number: int) -> Mapper[Job, Record]:
     """
     Return what answers in processes that live until all is done.
 
@@ -23,7 +24,7 @@ def processes(number: int) -> Mapper:
     def answers(function: Answers, jobs: Iterable[Job], /) -> Iterator[Record]:
         left = list(jobs)
         while left:
-            with _pool(min(number, len(left))) as pool:
+            with pool_of(min(number, len(left))) as pool:
                 futures = [pool.submit(function, job) for job in left]
                 try:
                     for future in futures:
@@ -43,7 +44,8 @@ def processes(number: int) -> Mapper:
     return answers
 
 
-def _pool(number: int) -> ProcessPoolExecutor:
+def pool_of(number: int) -> ProcessPoolExecutor:
+    """Return processes that know nothing of this one."""
     # A fork of a process that has threads, as numpy's may be, can hang.
     return ProcessPoolExecutor(number, mp_context=get_context('spawn'))
 
@@ -51,14 +53,14 @@ def _pool(number: int) -> ProcessPoolExecutor:
 def _alone(function: Answers, job: Job) -> None:
     """Answer a bag that was begun when a process ended; its record tells what became of it."""
     try:
-        with _pool(1) as pool:
+        with pool_of(1) as pool:
             pool.submit(function, job).result()
     except BrokenProcessPool:
         job.keep(Record(str(job.bag), failure='its process was ended twice (memory?)'))
         job.begun.unlink(missing_ok=True)
 
 
-def cluster(address: str) -> Mapper:
+def cluster(address: str) -> Mapper[Job, Record]:
     """
     Return what answers on the workers of a Dask cluster.
 

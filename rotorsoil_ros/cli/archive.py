@@ -10,7 +10,8 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.errors import InputError
 
 if TYPE_CHECKING:
-    from rotorsoil_ros.bags.archive import Mapper, Record
+    from rotorsoil_ros.background import Mapper
+    from rotorsoil_ros.bags.archive import Job, Record
     from rotorsoil_ros.case.machine import Machine
     from rotorsoil_ros.wire.speeds import SpeedSource
 
@@ -59,7 +60,7 @@ def _place(arguments: Namespace) -> Path:
     return Path(arguments.statistics).with_suffix('.records')
 
 
-def _map(arguments: Namespace) -> 'Mapper':
+def _map(arguments: Namespace) -> 'Mapper[Job, Record]':
     from rotorsoil_ros.bags.workers import cluster, processes
 
     if arguments.dask is not None:

@@ -30,6 +30,8 @@ from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.boundary.table import BoundaryTable
+from rotorsoil_ros.ground.elements.table import DimensionlessTable
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -150,10 +152,7 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
                                    f'{table.poisson_ratio:g}, eta {table.loss_factor:g}')
     yield f'{block}: covers', (f'a0 {table.a0_min:g} to {table.a0_max:g}, here {low:.4g} to '
                                f'{high:.4g} Hz')
-    yield f'{block}: solves', f'{table.solves} of {table.unknowns} unknowns'
-    yield (f'{block}: largest error of the solver',
-           f'{table.measured_error:.2g}, at unseen frequencies')
-    yield f'{block}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
+    yield from _solved(block, table, soil, directory)
 
 
 def _boundary(
@@ -164,10 +163,18 @@ def _boundary(
                                     f'{table.loss_factor:g}')
     yield f'{blocks}: covers', (f'a0 0 to {table.a0_max:g}, here 0 to '
                                 f'{rad_s_to_hz(soil.omega_range[1]):.4g} Hz')
-    yield f'{blocks}: solves', f'{table.solves} of {table.unknowns} unknowns'
-    yield (f'{blocks}: largest error of the solver',
+    yield from _solved(blocks, table, soil, directory)
+
+
+def _solved(
+    block: str, table: DimensionlessTable | BoundaryTable,
+    soil: InfiniteElementModel | BoundaryElementModel, directory: Path,
+) -> Iterable[tuple[str, str]]:
+    """Yield what a table cost, how good it is, and where it lies."""
+    yield f'{block}: solves', f'{table.solves} of {table.unknowns} unknowns'
+    yield (f'{block}: largest error of the solver',
            f'{table.measured_error:.2g}, at unseen frequencies')
-    yield f'{blocks}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
+    yield f'{block}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
 
 
 def _stability(found: Stability, units: Units) -> Iterable[tuple[str, str]]:

@@ -1,20 +1,20 @@
 """What if? The response of a machine with all values of some keys of its case."""
 
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 import csv
 import sys
-from typing import TYPE_CHECKING
+from typing import TextIO, TYPE_CHECKING
 
-from rotorsoil_ros.case.design.variants import Study, study as solve
+from rotorsoil_ros.case.design.variants import Study, study as solve, Tried, Variant
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
 from rotorsoil_ros.cli.table import opened
 from rotorsoil_ros.errors import InputError
 
 if TYPE_CHECKING:
-    from rotorsoil_ros.case.design.variants import TriesAll
+    from rotorsoil_ros.background import Mapper
 
 
 def study(arguments: Namespace) -> int:
@@ -24,14 +24,16 @@ def study(arguments: Namespace) -> int:
         raise InputError('--vary: a key is given twice')
     if arguments.picture is not None and len(varied) > 2:
         raise InputError('--picture shows one or two keys')
-    with progress('solving') as report, _mapped(arguments.jobs) as tries_all:
+    with progress('solving') as report, _mapped(arguments.jobs) as mapped:
         number, total = 0, 1
         for each in varied.values():
             total *= len(each)
 
-        def counted(function, variants, /):  # type: ignore[no-untyped-def]
+        def counted(
+            function: Callable[[Variant], Tried], variants: Iterable[Variant], /,
+        ) -> Iterator[Tried]:
             nonlocal number
-            for tried in tries_all(function, variants):
+            for tried in mapped(function, variants):
                 number += 1
                 report(number, total)
                 yield tried
@@ -49,20 +51,20 @@ def study(arguments: Namespace) -> int:
 
 
 @contextmanager
-def _mapped(jobs: int) -> 'Iterator[TriesAll]':
+def _mapped(jobs: int) -> 'Iterator[Mapper[Variant, Tried]]':
     if jobs == 1:
         yield map
         return
-    from concurrent.futures import ProcessPoolExecutor
     from functools import partial
-    from multiprocessing import get_context
 
-    with ProcessPoolExecutor(jobs, mp_context=get_context('spawn')) as pool:
+    from rotorsoil_ros.bags.workers import pool_of
+
+    with pool_of(jobs) as pool:
         yield partial(pool.map, chunksize=8)
 
 
-def _write(found: Study, stream: object) -> None:
+def _write(found: Study, stream: TextIO) -> None:
     names = dict.fromkeys(name for row in found.rows() for name in row)
-    writer = csv.DictWriter(stream, names, restval='', lineterminator='\n')  # type: ignore
+    writer = csv.DictWriter(stream, names, restval='', lineterminator='\n')
     writer.writeheader()
     writer.writerows(found.rows())

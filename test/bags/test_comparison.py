@@ -158,78 +158,66 @@ def test_live_and_compare_find_the_same_amplitudes_in_packets(
                                true.amplitude[steady], rtol=0.05)
 
 
-def packed(answered, path, apart_ns):
-    """Write speeds and one sensor of a log, its samples eight at a time."""
+def rewritten(answered, path, change, *, at_most=500):
+    """Write speeds and one sensor of a log; `change` gives stamps and messages of a batch."""
     with LogFile(path) as log:
         for batch in bag_reader.batches(
                 answered, lambda topic, _: topic.endswith(('fan_end_housing_x/imu', 'states')),
-                at_most=512):
+                at_most=at_most):
             if not batch.topic.endswith('imu'):
                 log.write(batch)
                 continue
             layout = Layout.of(IMU, batch.payloads[0])
             rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
-            number = np.arange(len(rows))
-            stamps = np.array(batch.log_time_ns)[np.minimum(
-                number // 8 * 8 + 7, len(rows) - 1)] + apart_ns * (number % 8 - 7)
+            stamps, times = change(rows, np.array(batch.log_time_ns))
             rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, SECOND)
-            log.write(Records(batch.topic, IMU, stamps.tolist(), [
-                bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]))
+            cdrs = np.repeat(rows.view(np.uint8).reshape(len(rows), -1), times, axis=0)
+            log.write(Records(batch.topic, IMU, np.repeat(stamps, times).tolist(), [
+                bytes(cdr) for cdr in cdrs]))
     return path
+
+
+def packed(answered, path, apart_ns):
+    """Write speeds and one sensor of a log, its samples eight at a time."""
+    def change(rows, stamps):
+        number = np.arange(len(rows))
+        return stamps[np.minimum(number // 8 * 8 + 7, len(rows) - 1)] + apart_ns * (
+            number % 8 - 7), 1
+
+    return rewritten(answered, path, change, at_most=512)
 
 
 def tilted(answered, path):
     """Write speeds and one sensor of a log, turned by a quarter about y, and in g."""
-    with LogFile(path) as log:
-        for batch in bag_reader.batches(
-                answered, lambda topic, _: topic.endswith(('fan_end_housing_x/imu', 'states')),
-                at_most=500):
-            if not batch.topic.endswith('imu'):
-                log.write(batch)
-                continue
-            layout = Layout.of(IMU, batch.payloads[0])
-            rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
-            felt = rows['linear_acceleration']
-            felt[:] = felt[:, [2, 1, 0]] * [1.0, 1.0, -1.0] / 9.80665
-            second = (np.array(batch.log_time_ns) - START) // SECOND
-            half = 0.5 * np.radians(np.where((second >= 20) & (second < 24), -85.0, -90.0))
-            rows['orientation'] = rows['orientation_covariance'] = 0.0
-            rows['orientation'][:, 1], rows['orientation'][:, 3] = np.sin(half), np.cos(half)
-            log.write(Records(batch.topic, IMU, batch.log_time_ns, [
-                bytes(row) for row in rows.view(np.uint8).reshape(len(rows), -1)]))
-    return path
+    def change(rows, stamps):
+        felt = rows['linear_acceleration']
+        felt[:] = felt[:, [2, 1, 0]] * [1.0, 1.0, -1.0] / 9.80665
+        second = (stamps - START) // SECOND
+        half = 0.5 * np.radians(np.where((second >= 20) & (second < 24), -85.0, -90.0))
+        rows['orientation'] = rows['orientation_covariance'] = 0.0
+        rows['orientation'][:, 1], rows['orientation'][:, 3] = np.sin(half), np.cos(half)
+        return stamps, 1
+
+    return rewritten(answered, path, change)
 
 
 def spoiled(answered, path):
     """Write speeds and one sensor of a log, its samples spoiled in some seconds."""
     rail = None
-    with LogFile(path) as log:
-        for batch in bag_reader.batches(
-                answered, lambda topic, _: topic.endswith(('fan_end_housing_x/imu', 'states')),
-                at_most=500):
-            if not batch.topic.endswith('imu'):
-                log.write(batch)
-                continue
-            layout = Layout.of(IMU, batch.payloads[0])
-            rows = np.frombuffer(bytearray(b''.join(batch.payloads)), dtype=layout.dtype)
-            felt = rows['linear_acceleration']
-            stamps = np.array(batch.log_time_ns)
-            second = (stamps - START) // SECOND
-            felt[(second >= 10) & (second < 14)] = 0.25
-            dwells = (second >= 21) & (second < 25)
-            if dwells.any():
-                rail = 0.6 * np.abs(felt[dwells, 0]).max() if rail is None else rail
-                felt[dwells] = felt[dwells].clip(-rail, rail)
-            together = (second >= 30) & (second < 34)
-            number = np.arange(len(stamps))
-            stamps = np.where(together, stamps[np.minimum(number // 8 * 8 + 7, len(number) - 1)]
-                              + 2000 * (number % 8), stamps)
-            rows['header.stamp.sec'], rows['header.stamp.nanosec'] = np.divmod(stamps, SECOND)
-            times = np.where(second >= 38, 2, 1)
-            cdrs = np.repeat(rows.view(np.uint8).reshape(len(rows), -1), times, axis=0)
-            log.write(Records(batch.topic, IMU, np.repeat(stamps, times).tolist(), [
-                bytes(cdr) for cdr in cdrs]))
-    return path
+
+    def change(rows, stamps):
+        nonlocal rail
+        felt, second = rows['linear_acceleration'], (stamps - START) // SECOND
+        felt[(second >= 10) & (second < 14)] = 0.25
+        dwells = (second >= 21) & (second < 25)
+        if dwells.any():
+            rail = 0.6 * np.abs(felt[dwells, 0]).max() if rail is None else rail
+            felt[dwells] = felt[dwells].clip(-rail, rail)
+        together, number = (second >= 30) & (second < 34), np.arange(len(stamps))
+        packets = stamps[np.minimum(number // 8 * 8 + 7, len(number) - 1)] + 2000 * (number % 8)
+        return np.where(together, packets, stamps), np.where(second >= 38, 2, 1)
+
+    return rewritten(answered, path, change)
 
 
 def test_no_peak_of_the_demonstration_is_missing(watched):

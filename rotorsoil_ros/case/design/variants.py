@@ -1,15 +1,15 @@
 """What if the ground were softer, the block heavier? One machine with all values of some keys."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 import math
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, Numbers, numbers
+from rotorsoil_ros.background import Mapper
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.machine import load, Machine
 from rotorsoil_ros.channel import Channel
@@ -18,15 +18,6 @@ from rotorsoil_ros.prediction import columns_of
 from rotorsoil_ros.units import rpm_to_rad_s, to_mm_s_rms
 
 MOST_VARIANTS = 100_000
-
-
-class TriesAll(Protocol):
-    """What calls a function on each of some variants: `map`, or that of any executor."""
-
-    def __call__(
-        self, function: Callable[['Variant'], 'Tried'], variants: Iterable['Variant'], /,
-    ) -> Iterable['Tried']:
-        """Return what it gave, in the order of the variants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +127,7 @@ class Study:
 
 def study(
     case: Machine | Path | str, values: Mapping[str, Sequence[float] | FloatArray], *,
-    rpm: Numbers, map: TriesAll = map,  # noqa: A002, as every executor calls it
+    rpm: Numbers, map: Mapper[Variant, Tried] = map,  # noqa: A002, as every executor calls it
     cache_directory: Path | None = None,
 ) -> Study:
     """
