@@ -82,7 +82,8 @@ class BlockEntries:
             return Foundation(
                 name=entry.name, contact=contact, mass=mass, centre_x=entry.centre_x + x,
                 centre_y=along + y, centre_of_gravity_height=centre, inertia=inertia,
-                height=entry.height, inertia_product=product)
+                height=entry.height, inertia_product=product,
+                young_modulus=entry.young_modulus)
 
     def _body(
         self, index: int, entry: schema.FoundationEntry, contact: Contact,

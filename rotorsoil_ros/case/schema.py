@@ -27,6 +27,7 @@ from rotorsoil_ros.case.quantities import (
     Ratio,
     Rpm,
 )
+from rotorsoil_ros.machine.foundation import CONCRETE
 
 
 class SoilEntry(Entry):
@@ -102,6 +103,7 @@ class FoundationEntry(Entry):
     inertia: tuple[KilogramSquareMetre, KilogramSquareMetre, KilogramSquareMetre] | None = None
     height: Metre | None = None
     density: KilogramPerCubicMetre | None = None
+    young_modulus: Pascal = CONCRETE
     embedment: Metre = 0.0
     side_contact: Ratio | None = None
     stiffness_file: FileName | None = None

@@ -17,6 +17,7 @@ from rotorsoil_ros.case.design.ground import (
     of_shapes,
     of_site,
 )
+from rotorsoil_ros.case.design.rigidity import bending_told
 from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
@@ -88,6 +89,7 @@ def derived_quantities(
         told = model_error(case, foundation, shape)
         if told:
             yield f'{foundation.name}: model error', told
+    yield from bending_told(case, soil_models)
     yield from of_site(case, soil_models)
     for journal in case.journals:
         yield from _of_journal(case, journal)

@@ -13,6 +13,7 @@ from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.case.design.depth import depth_remarks
 from rotorsoil_ros.case.design.ground import model_error
 from rotorsoil_ros.case.design.report import Acceptance
+from rotorsoil_ros.case.design.rigidity import of_rigidity
 from rotorsoil_ros.case.design.tables import key_of
 from rotorsoil_ros.case.journal_entries import BEYOND
 from rotorsoil_ros.case.summary import (
@@ -73,7 +74,8 @@ def check(arguments: Namespace) -> int:
     _print_table(_of_damping(case, model, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
-                         warnings(case, shapes), depth_remarks(case, model, directory)):
+                         warnings(case, shapes), of_rigidity(case, model.soil_models),
+                         depth_remarks(case, model, directory)):
         print(f'warning: {warning}')
     growing = list(unstable(table.stability))
     for text in growing:

@@ -11,6 +11,9 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, require
 from rotorsoil_ros.ground.soil import Contact
 
+# Young's modulus of what most blocks are made of [Pa].
+CONCRETE = 30e9
+
 
 def solid_inertia(
     contact: Contact, *, mass: float, height: float,
@@ -46,6 +49,8 @@ class Foundation:
         Position of the contact centre across the shaft, whose plane is x = 0 [m].
     inertia_product : float
         Integral of x y dm about the centre of gravity [kg m^2]: of an L, not of a rectangle.
+    young_modulus : float
+        Of what it is made of [Pa]; whether it is rigid depends on it, and nothing else.
 
     """
 
@@ -58,6 +63,7 @@ class Foundation:
     height: float | None = None
     centre_x: float = 0.0
     inertia_product: float = 0.0
+    young_modulus: float = CONCRETE
 
     def __post_init__(self) -> None:
         require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)
@@ -67,6 +73,8 @@ class Foundation:
                 'finite, in m', self.centre_of_gravity_height)
         if self.height is not None:
             require(0.0 < self.height < math.inf, 'height', '> 0 m and finite', self.height)
+        require(0.0 < self.young_modulus < math.inf, 'young_modulus', '> 0 Pa and finite',
+                self.young_modulus)
         for axis, value in zip('xyz', self.inertia, strict=True):
             require(0.0 <= value < math.inf, f'inertia about {axis}', '>= 0 kg m^2 and finite',
                     value)

@@ -15,6 +15,7 @@ from rotorsoil_ros.case.design.ground import band_contents, model_error
 from rotorsoil_ros.case.design.influence import extremes, influences
 from rotorsoil_ros.case.design.margins import near_modes
 from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
+from rotorsoil_ros.case.design.rigidity import of_rigidity
 from rotorsoil_ros.case.models import shape_errors
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, HOUSING
@@ -58,6 +59,7 @@ def design_report(machine: 'Machine', rpm: float) -> DesignReport:
         case, machine.model, speed=speed,
         channel=machine.model.channels.index(housings[0].channel)))
     found = findings(case, growth, housings, modes, moved)
+    found.unknown += of_rigidity(case, machine.model.soil_models)
     return DesignReport(
         case=case, speed=speed, verdict=verdict_of(found), reasons=found.in_order,
         stable=found.stable, housings=housings, modes=modes,

@@ -1,0 +1,1 @@
+"""Foundations that bend: when a block is rigid, and what stands in for one that is not."""
