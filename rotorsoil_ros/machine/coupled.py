@@ -8,12 +8,12 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.channel import ACROSS, across, Channel, DOFS, HOUSING, JOURNAL
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, require, RotorSoilError
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.coupling import Answer, answer
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.modes.natural import natural_frequencies
+from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.prediction import Prediction, Response
 from rotorsoil_ros.rotor.assembly import Rotor
@@ -27,14 +27,13 @@ UNBALANCE_FORCE = np.array([-1j, 1.0])
 # Speeds that are solved together: bounds memory, yet is long enough to hide Python.
 _CHUNK = 1024
 
-# A mode belongs to a direction if this share of the housings' motion is in it.
-_IN_DIRECTION = 0.1
-_STILL = 1e-9
-
 # Bytes of a block that is taken and given back untouched before a sweep: from then on the C
 # library keeps what is freed up to that size, where it would return every temporary array above
 # 128 KiB to the system and be handed it again, zeroed page by page, a quarter of the time.
 _KEPT = 1 << 24
+
+# Ground that does not move, under any number of columns of loads.
+_STILL = np.zeros((3, 1))
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,8 @@ class CoupledModel:
         Discs whose unbalance is also a couple: each is a plane of its own.
     points : sequence of str
         Names of the points on the ground whose motion its `SharedGround` tells, in its order.
+    place : Placement
+        Where the shaft lies.
 
     """
 
@@ -60,6 +61,7 @@ class CoupledModel:
     soil_models: Sequence[SoilModel] = ()
     couples: Sequence[str] = ()
     points: Sequence[str] = ()
+    place: Placement = AT_ORIGIN
 
     def __post_init__(self) -> None:
         discs = [disc.name for disc in self.rotor.discs]
@@ -79,16 +81,17 @@ class CoupledModel:
     def support(self) -> Support:
         """The blocks below the bearings."""
         return Support(self.rotor.bearings, self.rotor.shaft_height,
-                       self.foundations, self.soil_models)
+                       self.foundations, self.soil_models, self.place)
+
+    @property
+    def rotors(self) -> tuple[Rotor, ...]:
+        """All that turn on these blocks, in the order of the channels."""
+        return (self.rotor,)
 
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """All motions, in the order of the last axis of a Prediction."""
-        rotor = self.rotor
-        found = [channel for bearing in rotor.bearings for part in (JOURNAL, HOUSING)
-                 for channel in across(bearing.name, part)]
-        found += [channel for station in rotor.stations[len(rotor.bearings):]
-                  for channel in across(station.name)]
+        found = [channel for rotor in self.rotors for channel in rotor.channels]
         found += [Channel(foundation.name, '', dof)
                   for foundation in self.foundations for dof in DOFS]
         found += [Channel(point, '', axis) for point in self.points for axis in DOFS[:3]]
@@ -97,9 +100,8 @@ class CoupledModel:
     @cached_property
     def transmits_force(self) -> BoolArray:
         """Which channels transmit a force, (c,) bool: bearings and foundations."""
-        stations = 2 * len(self.rotor.discs) + 2 * len(self.rotor.probes)
-        return np.array([True] * (4 * len(self.rotor.bearings)) + [False] * stations
-                        + [True] * (6 * len(self.foundations)) + [False] * self._on_ground)
+        found = [channel.part != '' for rotor in self.rotors for channel in rotor.channels]
+        return np.array(found + [True] * (6 * len(self.foundations)) + [False] * self._on_ground)
 
     @property
     def _on_ground(self) -> int:
@@ -128,7 +130,7 @@ class CoupledModel:
         return np.array([spring if spring > 0.0 else least for spring in own])
 
     @cached_property
-    def _ports(self) -> list[int]:
+    def ports(self) -> list[int]:
         rotor = self.rotor
         places = {disc.name: 2 * rotor.node_of(disc.position) for disc in rotor.discs}
         return [*(2 * rotor.node_of(station.position) for station in rotor.stations),
@@ -136,7 +138,7 @@ class CoupledModel:
 
     @cached_property
     def _synchronous_modes(self) -> WhirlModes:
-        return WhirlModes.of(self.rotor, self._ports, springs=self.nominal_springs, order=1.0)
+        return WhirlModes.of(self.rotor, self.ports, springs=self.nominal_springs, order=1.0)
 
     def unbalance_response(self, speed: FloatArray, unbalance: ComplexArray) -> Prediction:
         """
@@ -176,10 +178,10 @@ class CoupledModel:
         """
         discs = len(self.rotor.discs)
         first = [len(self.rotor.bearings), len(self.rotor.stations) - discs]
-        forces = np.zeros((len(self._ports), 2, len(self.planes)), dtype=complex)
+        forces = np.zeros((len(self.ports), 2, len(self.planes)), dtype=complex)
         for plane in range(len(self.planes)):
             forces[first[plane >= discs] + plane, :, plane] = UNBALANCE_FORCE
-        return forces.reshape(2 * len(self._ports), len(self.planes))
+        return forces.reshape(2 * len(self.ports), len(self.planes))
 
     def frequency_response(
         self, omega: FloatArray, *, speed: float, channel: str,
@@ -204,9 +206,8 @@ class CoupledModel:
 
         """
         omega = np.asarray(omega, dtype=float)
-        modes = WhirlModes.at(self.rotor, self._ports, springs=self.nominal_springs, speed=speed,
-                              highest=float(np.abs(omega).max(initial=0.0)))
-        return self._forced(modes, omega, np.full(len(omega), float(speed)), channel)
+        return self._forced(self._modes_at(speed, omega), omega,
+                            np.full(len(omega), float(speed)), channel)
 
     def harmonic_response(
         self, speed: FloatArray, *, order: float, channel: str,
@@ -226,13 +227,16 @@ class CoupledModel:
         """
         require(0.0 < order < math.inf, 'order', '> 0 and finite', order)
         speed = np.asarray(speed, dtype=float)
-        modes = WhirlModes.of(self.rotor, self._ports, springs=self.nominal_springs, order=order)
+        modes = WhirlModes.of(self.rotor, self.ports, springs=self.nominal_springs, order=order)
         return self._forced(modes, order * speed, speed, channel)
 
     def _forced(
         self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, channel: str,
     ) -> Response:
-        loaded = self.channels[:len(self.channels) - self._on_ground]
+        led = [one for rotor in self.rotors if rotor is not self.rotor
+               for one in rotor.channels if not one.is_housing]
+        moving = self.channels[:len(self.channels) - self._on_ground]
+        loaded = [one for one in moving if one not in led]
         if channel not in loaded:
             raise RotorSoilError(f'force must act at one of {", ".join(loaded)}, got {channel}')
         load = np.zeros((len(self.channels), 1), dtype=complex)
@@ -242,13 +246,46 @@ class CoupledModel:
 
     def _sorted(self, loads: ComplexArray) -> ComplexArray:
         """Put loads on the channels, (c, k), into the order of ports, housings and blocks."""
-        loads = loads[:len(loads) - self._on_ground]
-        bearings = 4 * len(self.rotor.bearings)
-        blocks = len(loads) - 6 * len(self.foundations)
-        seats = loads[:bearings].reshape(-1, 2, 2, loads.shape[1])
-        journal, housing = (seats[:, part].reshape(-1, loads.shape[1]) for part in (0, 1))
-        slopes = np.zeros((2 * len(self.couples), loads.shape[1]))
-        return np.concatenate([journal, loads[bearings:blocks], slopes, housing, loads[blocks:]])
+        ports, housings, first = [], [], 0
+        for rotor in self.rotors:
+            seats, end = first + 4 * len(rotor.bearings), first + len(rotor.channels)
+            pairs = loads[first:seats].reshape(-1, 2, 2, loads.shape[1])
+            journal, housing = (pairs[:, part].reshape(-1, loads.shape[1]) for part in (0, 1))
+            housings.append(housing)
+            if rotor is self.rotor:
+                slopes = np.zeros((2 * len(self.couples), loads.shape[1]))
+                ports = [journal, loads[seats:end], slopes]
+            first = end
+        return np.concatenate([*ports, *housings, loads[first:len(loads) - self._on_ground]])
+
+    def ground_response(
+        self, omega: FloatArray, *, speed: float,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Solve for the response to ground that moves, while the rotor turns at fixed speed.
+
+        Parameters
+        ----------
+        omega : (n,) float array
+            Frequency of the motion [rad/s].
+        speed : float
+            Rotor speed [rad/s].
+
+        Returns
+        -------
+        displacement, force : (n, c, 3) complex arrays
+            As `synchronous_response`, per unit motion of the ground along x, y, z, the same
+            below all blocks and where bearings stand on the ground itself [m/m], [N/m].
+
+        """
+        omega = np.asarray(omega, dtype=float)
+        still = self._on_rotor(np.zeros((2 * len(self.ports), 3), dtype=complex))
+        return self._respond(self._modes_at(speed, omega), omega,
+                             np.full(len(omega), float(speed)), still, np.eye(3))
+
+    def _modes_at(self, speed: float, omega: FloatArray) -> WhirlModes:
+        return WhirlModes.at(self.rotor, self.ports, springs=self.nominal_springs, speed=speed,
+                             highest=float(np.abs(omega).max(initial=0.0)))
 
     def synchronous_response(
         self, speed: FloatArray, loads: ComplexArray,
@@ -275,11 +312,13 @@ class CoupledModel:
 
     def _on_rotor(self, loads: ComplexArray) -> ComplexArray:
         """Extend loads on the ports by none on housings and blocks."""
-        below = 2 * len(self.rotor.bearings) + 6 * len(self.foundations)
+        housings = sum(2 * len(rotor.bearings) for rotor in self.rotors)
+        below = housings + 6 * len(self.foundations)
         return np.concatenate([loads, np.zeros((below, loads.shape[1]))])
 
     def _respond(
         self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, loads: ComplexArray,
+        ground: FloatArray = _STILL,
     ) -> tuple[ComplexArray, ComplexArray]:
         """Solve, some frequencies at a time, and sort by channel: (n, c, k) each."""
         np.empty(_KEPT, dtype=np.uint8)
@@ -288,75 +327,40 @@ class CoupledModel:
         force = np.full(shape, complex(np.nan, np.nan))
         for start in range(0, len(omega), _CHUNK):
             chunk = slice(start, start + _CHUNK)
-            found = answer(
-                modes.receptance(omega[chunk]), self.support.standing(omega[chunk]), loads,
-                bearings=self.bearing_stiffness(omega[chunk], speed[chunk]),
-                springs=np.repeat(self.nominal_springs, 2))
+            found = self._answer(modes, omega[chunk], speed[chunk], loads, ground)
             displacement[chunk], force[chunk][:, self.transmits_force] = self._arrange(found)
         if not np.all(np.isfinite(displacement)):
             raise NotSolvedError('the coupled system has no finite solution')
         return displacement, force
 
+    def _answer(
+        self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, loads: ComplexArray,
+        ground: FloatArray,
+    ) -> Answer:
+        """Solve at all these frequencies at once."""
+        return answer(
+            modes.receptance(omega), self.support.standing(omega), loads, ground=ground,
+            bearings=self.bearing_stiffness(omega, speed),
+            springs=np.repeat(self.nominal_springs, 2))
+
     def _arrange(self, found: Answer) -> tuple[ComplexArray, ComplexArray]:
         """Put the answer into the order of the channels."""
-        length, _, columns = found.ports.shape
-        bearings, stations = len(self.rotor.bearings), len(self.rotor.stations)
-        pairs = (length, bearings, 2, columns)
+        length, _, columns = found.blocks.shape
 
         def interleave(journal: ComplexArray, housing: ComplexArray) -> ComplexArray:
+            pairs = (length, journal.shape[1] // 2, 2, columns)
             both = np.stack([journal.reshape(pairs), housing.reshape(pairs)], axis=2)
-            return both.reshape(length, 4 * bearings, columns)
+            return both.reshape(length, 2 * journal.shape[1], columns)
 
-        displacement = np.concatenate([
-            interleave(found.ports[:, :2 * bearings], found.housings),
-            found.ports[:, 2 * bearings:2 * stations], found.blocks, found.ground], axis=1)
-        return displacement, np.concatenate([
-            interleave(found.through, found.through), found.into_soil], axis=1)
-
-    def lowest_natural_frequency(self, axis: str, highest: float) -> float:
-        """
-        Return the lowest frequency of machine and support in a direction, the rotor being rigid.
-
-        Parameters
-        ----------
-        axis : str
-            `x` or `z`, in which the housings move.
-        highest : float
-            Up to which to look, as far as the soil is known [rad/s].
-
-        Returns
-        -------
-        float
-            [rad/s]; infinite where there is none, as on a rigid support.
-
-        References
-        ----------
-        ISO 20816-1: the class of a support goes by the lowest natural frequency of the combined
-        machine and support in the direction of measurement; shaft bending is none of it.
-
-        """
-        column = ACROSS.index(axis)
-        frequency, motion = natural_frequencies(self.support, self._riding_mass, highest)
-        power = np.abs(motion).reshape(len(motion), len(self.rotor.bearings), 2) ** 2
-        total = power.sum(axis=(1, 2))
-        # A block that slides along the shaft moves no housing across it, but for round-off.
-        moves = ((power[..., column].sum(axis=1) >= _IN_DIRECTION * total)
-                 & (total > _STILL * total.max(initial=0.0)))
-        return float(frequency[moves].min(initial=math.inf))
-
-    @cached_property
-    def _riding_mass(self) -> FloatArray:
-        """Mass of the rotor as a rigid body on its housings, (2 b, 2 b) [kg]."""
-        rotor = self.rotor
-        _, mass, _ = rotor.plane_matrices
-        places = rotor.node_positions
-        rigid = np.stack([np.column_stack([np.ones_like(places), np.zeros_like(places)]).ravel(),
-                          np.column_stack([places, np.ones_like(places)]).ravel()], axis=1)
-        seats = np.array([[1.0, bearing.position] for bearing in rotor.bearings])
-        # Of three bearings and more the line that fits best.
-        follows = np.linalg.pinv(seats)
-        plane = follows.T @ (rigid.T @ mass @ rigid) @ follows
-        return np.kron(plane, np.eye(2))
+        displacement, force, first = [], [], 0
+        for rotor, ports in zip(self.rotors, found.ports, strict=True):
+            seats, own = 2 * len(rotor.bearings), slice(first, first + 2 * len(rotor.bearings))
+            displacement += [interleave(ports[:, :seats], found.housings[:, own]),
+                             ports[:, seats:2 * len(rotor.stations)]]
+            force.append(interleave(found.through[:, own], found.through[:, own]))
+            first = own.stop
+        return (np.concatenate([*displacement, found.blocks, found.ground], axis=1),
+                np.concatenate([*force, found.into_soil], axis=1))
 
     def within_tables(self, span: tuple[float, float]) -> tuple[float, float]:
         """

@@ -17,8 +17,8 @@ class Answer:
 
     Attributes
     ----------
-    ports : (n, 2 p, k) complex array
-        Motion of the rotor's ports [m].
+    ports : tuple of (n, 2 p, k) complex arrays
+        Motion of the ports of every rotor [m].
     housings : (n, 2 b, k) complex array
         Motion of the bearing housings [m].
     blocks : (n, 6 f, k) complex array
@@ -32,7 +32,7 @@ class Answer:
 
     """
 
-    ports: ComplexArray
+    ports: tuple[ComplexArray, ...]
     housings: ComplexArray
     blocks: ComplexArray
     through: ComplexArray
@@ -41,7 +41,7 @@ class Answer:
 
 
 def answer(
-    rotor: PortReceptance, standing: Standing, loads: ComplexArray, *,
+    rotor: PortReceptance, standing: Standing, loads: ComplexArray, *, ground: FloatArray,
     bearings: ComplexArray, springs: FloatArray,
 ) -> Answer:
     """
@@ -49,17 +49,63 @@ def answer(
 
     Parameters
     ----------
-    rotor : PortReceptance
-        The rotor on isotropic springs in place of its bearings, which are its first ports.
+    rotor, bearings, springs
+        As `driven`.
     standing : Standing
         What the bearings stand on, at the same frequencies.
     loads : (2 p + 2 b + 6 f, k) complex array
         Columns of forces over (x, z) of the ports, over (x, z) of the housings and over the
         axes of the blocks [N, N m], the same at every frequency.
+    ground : (3, k) float array
+        Motion of the ground in the same columns [m].
+
+    """
+    reach = rotor.shapes.shape[1]
+    below = loads[reach:]
+    moved, pushed = standing.pushed(below, ground)
+    ports, through = driven(rotor, standing.receptance, moved, loads[:reach],
+                            bearings=bearings, springs=springs)
+    motion = standing.receptance @ through + moved
+    return gathered(standing, (ports,), motion, through, below, pushed, ground)
+
+
+def gathered(
+    standing: Standing, ports: tuple[ComplexArray, ...], housings: ComplexArray,
+    through: ComplexArray, below: ComplexArray, pushed: ComplexArray, ground: FloatArray,
+) -> Answer:
+    """Add what blocks and ground do under known forces through all bearings."""
+    blocks, into_soil = standing.blocks(through, housings, below, pushed)
+    points = standing.support.points(standing.omega) @ into_soil
+    points += np.tile(ground, (points.shape[1] // 3, 1))
+    return Answer(ports, housings, blocks, through, into_soil, points)
+
+
+def driven(
+    rotor: PortReceptance, housings: ComplexArray, moved: ComplexArray, loads: ComplexArray, *,
+    bearings: ComplexArray, springs: FloatArray,
+) -> tuple[ComplexArray, ComplexArray]:
+    """
+    Solve for a rotor in its bearings.
+
+    Parameters
+    ----------
+    rotor : PortReceptance
+        The rotor on isotropic springs in place of its bearings, which are its first ports.
+    housings : (n, 2 b, 2 b) complex array
+        Motion of the housings per force on them [m/N]; zero where they are led.
+    moved : (n or 1, 2 b, k) complex array
+        Motion of the housings while the bearings exert nothing [m].
+    loads : (2 p, k) complex array
+        Columns of forces over (x, z) of the ports [N].
     bearings : (n, 2 b, 2 b) complex array
         Dynamic stiffness of the bearings over (x, z) of each [N/m].
     springs : (2 b,) float array
         Those isotropic springs [N/m].
+
+    Returns
+    -------
+    ports (n, 2 p, k), through (n, 2 b, k) : complex arrays
+        Motion of the ports [m], force of the bearings on their housings [N].
 
     Raises
     ------
@@ -67,9 +113,7 @@ def answer(
         If the system is singular: an undamped resonance is hit.
 
     """
-    count, reach = len(springs), rotor.shapes.shape[1]
-    journals, loads, below = slice(0, count), loads[:reach], loads[reach:]
-    housings, (moved, pushed) = standing.receptance, standing.pushed(below)
+    count, journals = len(springs), slice(0, len(springs))
     # Through the bearings f = Z (x_journal - H f - u); what the springs in the rotor's modes have
     # not yet taken, g = f - k0 x_journal, obeys  A g = (Z - A k0) x_journal - Z u.
     a = np.eye(count) + bearings @ housings
@@ -82,7 +126,7 @@ def answer(
     moves = np.concatenate([rotor.between(count // 2), -near, np.broadcast_to(
         free[:, journals], (len(near), count, free.shape[2]))], axis=2)
     forces = w @ moves
-    system = np.zeros((len(standing.omega), size, size), dtype=complex)
+    system = np.zeros((len(near), size, size), dtype=complex)
     system[:, :count] = forces[..., :size]
     system[:, :count, :count] += a
     system[:, count:, :count] = adjoint[:, :, journals]
@@ -95,8 +139,4 @@ def answer(
                              'hit') from error
     beyond, amplitude = solution[:, :count], solution[:, count:]
     ports = free - rotor.motion(beyond) + rotor.shapes @ amplitude
-    through = beyond + springs[:, None] * ports[:, journals]
-    motion = housings @ through + moved
-    blocks, into_soil = standing.blocks(through, motion, below, pushed)
-    ground = standing.support.points(standing.omega) @ into_soil
-    return Answer(ports, motion, blocks, through, into_soil, ground)
+    return ports, beyond + springs[:, None] * ports[:, journals]

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, require
 from rotorsoil_ros.ground.soil import Contact
+from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 
 # Young's modulus of what most blocks are made of [Pa].
 CONCRETE = 30e9
@@ -108,18 +109,17 @@ class Foundation:
         matrix[3, 4] = matrix[4, 3] = -self.inertia_product
         return matrix
 
-    def seat_rows(self, *, position: float, height: float) -> FloatArray:
+    def seat_rows(
+        self, *, position: float, height: float, place: Placement = AT_ORIGIN,
+    ) -> FloatArray:
         """
         Return x and z of a point on the block per unit motion of the block, (2, 6).
 
-        The point lies in the vertical plane of the shaft, `position` [m] along it and
-        `height` [m] above the contact: u(r) = u + theta x r.
+        The point lies in the vertical plane of a shaft that is placed somewhere, `position` [m]
+        along it and `height` [m] above the contact.
         """
-        along = position - self.centre_y
-        return np.array([
-            [1.0, 0.0, 0.0, 0.0, height, -along],
-            [0.0, 0.0, 1.0, along, self.centre_x, 0.0],
-        ])
+        return place.seat_rows(position=position, height=height,
+                               centre=(self.centre_x, self.centre_y))
 
 
 @dataclass(frozen=True, slots=True)

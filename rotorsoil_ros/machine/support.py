@@ -20,6 +20,7 @@ from rotorsoil_ros.ground.soil import (
     SoilModel,
 )
 from rotorsoil_ros.machine.foundation import BlockReceptance, carrying, Foundation
+from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 from rotorsoil_ros.rotor.bearing import Bearing
 
 # Samples from which the compliance is continued, and those of a piece between branch points.
@@ -47,6 +48,10 @@ class Support:
         The blocks.
     soil_models : sequence of SoilModel
         The soil under each, or one `SharedGround` under all of them.
+    place : Placement
+        Where the shaft of the bearings lies.
+    burden : (6 f, 6 f) float array or None
+        Mass that rides on the blocks besides, as a rigid part of them [kg].
 
     """
 
@@ -54,6 +59,8 @@ class Support:
     shaft_height: float
     foundations: Sequence[Foundation]
     soil_models: Sequence[SoilModel]
+    place: Placement = AT_ORIGIN
+    burden: FloatArray | None = None
 
     def __post_init__(self) -> None:
         _ = self.soils
@@ -94,8 +101,9 @@ class Support:
     @cached_property
     def block_mass(self) -> FloatArray:
         """Mass matrix of all blocks, (6 f, 6 f)."""
-        return np.asarray(scipy.linalg.block_diag(
+        own = np.asarray(scipy.linalg.block_diag(
             np.zeros((0, 0)), *(block.mass_matrix for block in self.foundations)))
+        return own if self.burden is None else own + self.burden
 
     @cached_property
     def seat_rows(self) -> FloatArray:
@@ -113,8 +121,16 @@ class Support:
             for seat, bearing in enumerate(self.bearings):
                 if bearing.foundation == foundation.name:
                     rows[block, 2 * seat:2 * seat + 2] = foundation.seat_rows(
-                        position=bearing.position, height=self.shaft_height)
+                        position=bearing.position, height=self.shaft_height, place=self.place)
         return rows
+
+    @cached_property
+    def firm_rows(self) -> FloatArray:
+        """Motion per unit motion (x, y, z) of the ground, (2 b, 3), of what stands on no block."""
+        on_ground = Placement(heading=self.place.heading).seat_rows(
+            position=0.0, height=0.0, centre=(0.0, 0.0))[:, :3]
+        return np.concatenate([np.zeros((0, 3)), *(
+            on_ground * (bearing.foundation is None) for bearing in self.bearings)])
 
     @cached_property
     def block_rows(self) -> FloatArray:
@@ -293,7 +309,9 @@ class Standing:
             return motion
         return np.linalg.solve(carrying(self.deflection, mass, self.omega), motion)
 
-    def pushed(self, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    def pushed(
+        self, loads: ComplexArray, ground: FloatArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
         """
         Return what moves while the bearings exert nothing.
 
@@ -301,19 +319,33 @@ class Standing:
         ----------
         loads : (2 b + 6 f, k) complex array
             Forces on the housings, then on each block [N, N m].
+        ground : (3, k) float array
+            Motion of the ground along x, y, z where nothing stands on it, everywhere alike [m].
 
         Returns
         -------
         housings (n, 2 b, k), blocks (n, 6 f, k) : complex arrays
             Motion of the housings; that of the blocks without the housings' forces [m, rad].
 
+        References
+        ----------
+        Seed paper, eqs. (4) and (5), for the motion of the ground: the block follows it as far
+        as its own inertia lets it, (I - omega^2 N M)^-1 u_g, which needs no inverse of N.
+
         """
         count = self.receptance.shape[1]
-        if not loads.any():  # the usual case, at no cost
+        if not loads.any() and not ground.any():  # the usual case, at no cost
             return (np.zeros((1, count, loads.shape[1]), dtype=complex),
                     np.zeros((1, len(loads) - count, loads.shape[1]), dtype=complex))
+        support = self.support
         blocks = self.block_receptance.motion(loads[None, count:])
-        seats = self.support.block_rows @ blocks
+        firm = support.firm_rows @ ground
+        if ground.any():
+            moves = np.tile(np.concatenate([ground, np.zeros_like(ground)]),
+                            (len(support.foundations), 1))
+            follows = carrying(support.ground(self.omega), support.block_mass, self.omega)
+            blocks = blocks + np.linalg.solve(follows, moves)
+        seats = support.block_rows @ blocks + firm
         return self._carried(seats + self.deflection @ loads[:count]), blocks
 
     def blocks(

@@ -19,6 +19,7 @@ from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.machine.band import Envelope, ResponseBand
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.natural import lowest_natural_frequency
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
 from rotorsoil_ros.monitor.quasistatic import Resonance
 
@@ -92,7 +93,7 @@ class Expectation:
     def lowest_natural_speed(self, axis: str) -> float:
         """Return the lowest frequency of machine and support along x or z [rad/s], or inf."""
         highest = RIGID_MARGIN * _LOOKED_FOR[1] * self.case.speed_range[1]
-        return self.model.lowest_natural_frequency(axis, highest)
+        return lowest_natural_frequency(self.model, axis=axis, highest=highest)
 
     def vector(self, unbalances: Mapping[str, complex]) -> ComplexArray:
         """Return the unbalance of every plane [kg m]; a plane that is not named has none."""

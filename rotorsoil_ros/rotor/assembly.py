@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.channel import across, Channel, HOUSING, JOURNAL
 from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.rotor.beam import BeamElements, plane_matrices
 from rotorsoil_ros.rotor.bearing import Bearing
@@ -56,6 +57,14 @@ class Rotor:
     def stations(self) -> tuple[Disc | Bearing | Probe, ...]:
         """Bearings, discs and probes: what is a node of the mesh."""
         return (*self.bearings, *self.discs, *self.probes)
+
+    @cached_property
+    def channels(self) -> tuple[Channel, ...]:
+        """Motions of journals and housings, bearing by bearing, then of discs and probes."""
+        return (*(channel for bearing in self.bearings for part in (JOURNAL, HOUSING)
+                  for channel in across(bearing.name, part)),
+                *(channel for station in self.stations[len(self.bearings):]
+                  for channel in across(station.name)))
 
     @property
     def length(self) -> float:

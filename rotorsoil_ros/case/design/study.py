@@ -21,6 +21,7 @@ from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, HOUSING
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.damping import DampingSplit
+from rotorsoil_ros.machine.modes.natural import lowest_natural_frequency
 from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
 
@@ -105,7 +106,7 @@ def _housings(
         low, high = extremes(case, machine.model, speed)
         sizes[0], sizes[2] = np.fmin(sizes[0], low[columns]), np.fmax(sizes[2], high[columns])
     support = {axis: support_class(
-        machine.model.lowest_natural_frequency(axis, RIGID_MARGIN * speed), speed)
+        lowest_natural_frequency(machine.model, axis=axis, highest=RIGID_MARGIN * speed), speed)
         for axis in {channel.axis for channel in channels}}
     found = [HousingAnswer(channel, size, speed, support[channel.axis],
                            case.zones.of(support[channel.axis], speed))

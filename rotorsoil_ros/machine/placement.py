@@ -1,0 +1,71 @@
+"""Where on the ground a shaft lies, and how a point on it rides on what it stands on."""
+
+from dataclasses import dataclass, fields
+import math
+
+import numpy as np
+
+from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.errors import require
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """
+    Where the left end of a shaft lies in plan, and where its axis points.
+
+    Attributes
+    ----------
+    x, y : float
+        Of the left end in the axes of the ground, which all blocks share [m].
+    heading : float
+        Of the shaft's own axes about z, from the x of the ground towards its y [rad]. A shaft
+        that turns the other way round is one that points the other way, heading pi: so the spin
+        is positive for all.
+
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+    def __post_init__(self) -> None:
+        for own, unit in zip(fields(self), ('m', 'm', 'rad'), strict=True):
+            value = getattr(self, own.name)
+            require(math.isfinite(value), own.name, f'finite, in {unit}', value)
+
+    def seat_rows(
+        self, *, position: float, height: float, centre: tuple[float, float],
+    ) -> FloatArray:
+        """
+        Return x and z, across the shaft and up, of a seat per unit motion of its block.
+
+        Parameters
+        ----------
+        position, height : float
+            Of the seat along the shaft and above the contact [m].
+        centre : tuple of two floats
+            x and y of the centre of the contact in the axes of the ground [m].
+
+        Returns
+        -------
+        (2, 6) float array
+            Over (x, y, z, rx, ry, rz) of the block in the axes of the ground.
+
+        Notes
+        -----
+        u(r) = u + theta x r; along a direction e that is [e | r x e].
+
+        """
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        across = self.x - sine * position - centre[0]
+        along = self.y + cosine * position - centre[1]
+        return np.array([
+            [cosine, sine, 0.0, -sine * height, cosine * height,
+             sine * across - cosine * along],
+            [0.0, 0.0, 1.0, along, -across, 0.0],
+        ])
+
+
+# The shaft whose axes are those of the ground: a machine of its own.
+AT_ORIGIN = Placement()
