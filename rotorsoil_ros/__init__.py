@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.machine.modes.critical import CriticalSpeed
     from rotorsoil_ros.machine.response import Predictor, ResponseTable
     from rotorsoil_ros.machine.spread import SoilSpread
+    from rotorsoil_ros.machine.transmissibility import Transmissibility
     from rotorsoil_ros.monitor.comparison import Comparison
     from rotorsoil_ros.monitor.rules import Matching
     from rotorsoil_ros.monitor.verdict import Verdict
@@ -74,8 +75,8 @@ __all__ = [
     'Part', 'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Record',
     'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
     'ShaftSection', 'Site', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource', 'Study',
-    'ThinLayerModel', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log', 'import_table',
-    'load', 'predict_many', 'read_profile', 'study',
+    'ThinLayerModel', 'Transmissibility', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
+    'import_table', 'load', 'predict_many', 'read_profile', 'study',
 ]
 
 # Which room a public name lives in.
@@ -108,6 +109,7 @@ _ROOMS = {
     'machine.modes.critical': ('CriticalSpeed',),
     'machine.response': ('Predictor', 'ResponseTable'),
     'machine.spread': ('SoilSpread',),
+    'machine.transmissibility': ('Transmissibility',),
     'monitor.comparison': ('Comparison',),
     'monitor.rules': ('Matching',),
     'monitor.verdict': ('Verdict',),

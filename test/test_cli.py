@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.ground.cone import ConeModel
@@ -253,7 +254,8 @@ def test_plot_writes_every_picture(tmp_path, capsys):
     names = {Path(line).stem for line in capsys.readouterr().out.splitlines()}
     assert names == {'machine', 'support', 'bode_journals', 'bode_housings', 'bode_discs',
                      'bode_foundations', 'bode_rocking', 'orbits', 'shapes', 'campbell',
-                     'critical_shapes', 'polar', 'mass_ratios', 'compliance_block', 'damping'}
+                     'critical_shapes', 'polar', 'mass_ratios', 'compliance_block', 'damping',
+                     'transmissibility'}
     for path in (tmp_path / 'new' / 'plots').iterdir():
         assert path.read_bytes().startswith(b'\x89PNG')
 
@@ -296,10 +298,39 @@ def test_reader_that_has_seen_enough_hears_no_complaint():
     assert process.returncode == 0
 
 
+def test_transmissibility_is_that_of_the_machine_in_both_units(capsys):
+    asked = ['transmissibility', PAPER, '--set', 'support.model=cone', '--hz', '0:40:5', '--units']
+    assert main([*asked, 'si']) == 0
+    si, rows = table_of(capsys.readouterr().out)
+    assert main([*asked, 'plant']) == 0
+    plant, values = table_of(capsys.readouterr().out)
+    vector = complex_column(si, rows, 'disc_1_x__ground_x')
+    # At rest it moves as the ground does, to the last digits.
+    assert vector[0] == pytest.approx(1.0, abs=1e-9)
+    np.testing.assert_allclose(rows[:, 0], 2.0 * math.pi * values[:, 0])
+    size, lag = (values[:, plant.index(f'disc_1_x__ground_x{kind}')] for kind in ('', '_lag_deg'))
+    np.testing.assert_allclose(size * np.exp(-1j * np.radians(lag)), vector, rtol=1e-9)
+    machine = Machine.load(Path(PAPER), overrides=['support.model=cone'])
+    found = machine.transmissibility(hz=values[:, 0])
+    np.testing.assert_allclose(found['disc_1_x'].ratio[:, 0, 0], vector)
+    assert len(found) == len(found.frequency_hz) == 5
+    assert found.speed_rpm == 0.0
+
+
+def test_transmissibility_of_an_unstable_machine_is_not_told(capsys):
+    machine = ['--set', 'rotor.bearings.0.stiffness.xz=9e8', '--set',
+               'rotor.bearings.0.stiffness.zx=-9e8', '--set', 'support.model=cone']
+    assert main(['transmissibility', PAPER, *machine, '--hz', '10:20:2', '--rpm', '3000']) == 1
+    out, err = capsys.readouterr()
+    assert 'nan' in out
+    assert 'no steady response, NaN' in err
+
+
 @pytest.mark.parametrize('verb', [
     ['response', PAPER, '--rpm', '60:900:3', '-o'], ['plot', PAPER, '-o'],
     ['figures', '-o'], ['compliance', PAPER, '--hz', '1:2:2', '-o'],
     ['frf', PAPER, '--rpm', '0', '--hz', '1:2:2', '--force', 'disc_1_x', '-o'],
+    ['transmissibility', PAPER, '--hz', '1:2:2', '-o'],
     ['campbell', PAPER, '--rpm', '60:900:3', '-o']])
 def test_nothing_that_exists_is_overwritten(verb, tmp_path, capsys):
     kept = tmp_path / 'mine.csv'

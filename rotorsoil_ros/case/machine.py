@@ -1,7 +1,7 @@
 """What does a machine on its soil answer? A case with its models, asked in plant units."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from pathlib import Path
@@ -9,29 +9,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, Numbers, numbers
+from rotorsoil_ros.arrays import ComplexArray, Numbers, numbers
 from rotorsoil_ros.case import cache, config, document, models
+from rotorsoil_ros.case.answers.modal import ModalAnswers
 from rotorsoil_ros.case.journal_entries import bearing_states, BearingStates
-from rotorsoil_ros.case.summary import undecided
-from rotorsoil_ros.errors import InputError, NotSolvedError
+from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter
-from rotorsoil_ros.machine.modes.campbell import Campbell, campbell
-from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
-from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.transmissibility import Transmissibility
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
 if TYPE_CHECKING:
     from rotorsoil_ros.case.design.report import DesignReport
 
-MODES = 8  # of a Campbell diagram, unless somebody asks for more
 
 @dataclass(frozen=True)
-class Machine:
+class Machine(ModalAnswers):
     """
     A machine on its soil, as its case file describes it.
 
@@ -154,6 +150,34 @@ class Machine:
         found = self.model.frequency_response(omega, speed=float(speed[0]), channel=force)
         return found.where(np.repeat(self._growth(speed).holds(speed[:1]), len(omega)))
 
+    def transmissibility(self, *, hz: Numbers, rpm: float = 0.0) -> Transmissibility:
+        """
+        Solve for the motion of every channel per motion of the ground.
+
+        Parameters
+        ----------
+        hz : float or (n,) floats
+            Frequencies at which the ground moves [Hz].
+        rpm : float
+            Rotor speed [rpm].
+
+        Returns
+        -------
+        Transmissibility
+            Over n frequencies, all channels and the ground's x, y, z; NaN where the machine is
+            unstable.
+
+        Raises
+        ------
+        OutOfTableError, NotSolvedError
+            As `response`.
+
+        """
+        omega, speed = hz_to_rad_s(numbers('hz', hz)), rpm_to_rad_s(numbers('rpm', rpm))
+        found = Transmissibility.of(self.model, omega, speed=float(speed[0]))
+        holds = bool(self._growth(speed).holds(speed[:1])[0])
+        return found if holds else replace(found, ratio=np.full_like(found.ratio, math.nan))
+
     def order_response(self, *, order: float, force: str, rpm: Numbers) -> Response:
         """
         Solve for the response to a force of 1 N at a multiple of the speed.
@@ -171,106 +195,6 @@ class Machine:
         columns_of(self.model.channels, force)
         speed = rpm_to_rad_s(numbers('rpm', rpm))
         found = self.model.harmonic_response(speed, order=order, channel=force)
-        return found.where(self._growth(speed).holds(speed))
-
-    def stability(self, *, rpm_range: tuple[float, float] | None = None) -> Stability:
-        """
-        Find every mode that grows on its own, and what feeds it.
-
-        Parameters
-        ----------
-        rpm_range : tuple of two floats or None
-            Between which speeds [rpm], as far as tables of bearings go; None from rest to the
-            end of the speed range of the case.
-
-        Raises
-        ------
-        InputError
-            If what is known of the support does not determine the modes.
-
-        """
-        low, high = ((0.0, self.case.speed_range[1]) if rpm_range is None
-                     else rpm_to_rad_s(numbers('rpm_range', rpm_range)).tolist())
-        try:
-            return stability(self.model, (low, high))
-        except NotSolvedError as error:
-            raise self._undecided(error) from error
-
-    def _growth(self, speed: FloatArray) -> Stability:
-        """Return where a mode grows among speeds (n,) [rad/s]."""
-        if not len(speed):
-            return Stability((0.0, 0.0), (), 0.0)
-        return stability(self.model, (float(speed.min()), float(speed.max())))
-
-    def campbell(self, *, rpm: Numbers, modes: int = MODES) -> Campbell:
-        """
-        Return the lowest modes at each speed.
-
-        Parameters
-        ----------
-        rpm : float or (n,) floats
-            Rotor speeds, rising for the branches to make sense [rpm].
-        modes : int
-            How many at each speed; fewer where the machine has no more.
-
-        Returns
-        -------
-        Campbell
-            Frequencies [rad/s], damping ratios [-], whirl and branches, (n, modes) each.
-
-        Raises
-        ------
-        InputError
-            If what is known of the support does not determine the modes.
-
-        """
-        speed = rpm_to_rad_s(numbers('rpm', rpm))
-        try:
-            return campbell(self.model, speed, modes)
-        except NotSolvedError as error:
-            raise self._undecided(error) from error
-
-    def critical_speeds(
-        self, *, rpm_range: tuple[float, float] | None = None,
-    ) -> tuple[CriticalSpeed, ...]:
-        """
-        Find the speeds that excite a mode with its own frequency, rising.
-
-        Parameters
-        ----------
-        rpm_range : tuple of two floats or None
-            Between which speeds [rpm]; None for the speed range of the case.
-
-        Raises
-        ------
-        InputError
-            If what is known of the support does not determine the modes.
-
-        """
-        low, high = (self.case.speed_range if rpm_range is None
-                     else rpm_to_rad_s(numbers('rpm_range', rpm_range)).tolist())
-        try:
-            return critical_speeds(self.model, (low, high))
-        except NotSolvedError as error:
-            raise self._undecided(error) from error
-
-    def damping_split(self, *, rpm: Numbers) -> DampingSplit:
-        """
-        Return where the energy of the unbalance goes: bearings, soil material, radiation.
-
-        Parameters
-        ----------
-        rpm : float or (n,) floats
-            Rotor speeds [rpm].
-
-        Returns
-        -------
-        DampingSplit
-            Work of every part [J] per cycle; NaN where the machine is unstable.
-
-        """
-        speed = rpm_to_rad_s(numbers('rpm', rpm))
-        found = DampingSplitter(self.model).forced(speed, self.case.unbalance)
         return found.where(self._growth(speed).holds(speed))
 
     def band(self, *, rpm: Numbers) -> Bounds:
@@ -360,9 +284,6 @@ class Machine:
         """Return what the predictions under this name and this unbalance, (p,), rest on."""
         return models.description(self.case, self.model, self.table, name, unbalance)
 
-    def _undecided(self, error: NotSolvedError) -> InputError:
-        """Return the same error with the key of the case that is to blame."""
-        return InputError(f'{self.case.path}: {undecided(self.case, error)}')
 
 
 def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: object) -> Machine:

@@ -29,6 +29,7 @@ from rotorsoil_ros.figures.damping import damping_figure
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
+from rotorsoil_ros.figures.transmissibility import transmissibility_figure
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
@@ -53,7 +54,7 @@ def plot(arguments: Namespace) -> int:
         for name, figure in chain(
                 all_figures(case, model, machine.table), bearing_figures(case),
                 _modal_figures(case, model), _studies(case, model, machine.table),
-                _soil_figures(case, model, machine.directory)):
+                _ground_figures(case, model), _soil_figures(case, model, machine.directory)):
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)
             print(path)
@@ -79,6 +80,12 @@ def _studies(
         yield 'polar', polar(case, predictor, main_peaks(case, predictor))
         if case.support.model != 'rigid':
             yield 'mass_ratios', mass_ratios(case, model)
+
+
+def _ground_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, 'Figure']]:
+    """Yield what ground that moves does to the machine, where something is between them."""
+    if case.support.model != 'rigid':
+        yield 'transmissibility', transmissibility_figure(case, model)
 
 
 def _soil_figures(

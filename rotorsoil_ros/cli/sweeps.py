@@ -23,6 +23,7 @@ from rotorsoil_ros.cli.table import (
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.soil import OneOfBlocks
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.transmissibility import ALONG
 from rotorsoil_ros.prediction import Response
 from rotorsoil_ros.rotor.journal.states import JournalStates
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s
@@ -161,6 +162,25 @@ def frf(arguments: Namespace) -> int:
 
     write_responses(arguments, machine.model.channels, values(arguments.hz), solve,
                     per_force=True)
+    return _told(machine, rpm_to_rad_s(np.array([arguments.rpm])), arguments.rpm)
+
+
+def transmissibility(arguments: Namespace) -> int:
+    """Write the motion of every channel per motion of the ground along x, y and z."""
+    machine, plant = machine_of(arguments), units_of(arguments) == PLANT
+    names = [f'{channel}__ground_{axis}' for channel in machine.model.channels for axis in ALONG]
+    header = ['frequency_hz', *(f'{name}{kind}' for name in names for kind in ('', '_lag_deg'))
+              ] if plant else ['omega_rad_s', *complex_names(names)]
+
+    def rows(part: FloatArray) -> FloatArray:
+        found = machine.transmissibility(hz=part, rpm=arguments.rpm)
+        if plant:
+            both = np.stack([found.amplitude, found.phase_lag_deg()], axis=3)
+            return np.concatenate([part[:, None], both.reshape(len(part), -1)], axis=1)
+        return np.concatenate([found.omega[:, None], complex_columns(
+            found.ratio.reshape(len(part), -1))], axis=1)
+
+    write_sweep(arguments.output, header, values(arguments.hz), rows)
     return _told(machine, rpm_to_rad_s(np.array([arguments.rpm])), arguments.rpm)
 
 

@@ -132,6 +132,13 @@ def _add_modal_verbs(verbs: Verbs) -> None:
     frf.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, required=True,
                      help='frequency of the force [Hz]')
     add_table_output(frf, acts=True)
+    ground = add_verb(verbs, 'transmissibility', 'sweeps:transmissibility',
+                      'write the motion of every channel per motion of the ground as CSV')
+    ground.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, required=True,
+                        help='frequency at which the ground moves [Hz]')
+    ground.add_argument('--rpm', metavar='R', type=RPM, default=0.0,
+                        help='rotor speed [rpm] (default: the machine stands)')
+    add_table_output(ground)
     campbell = add_verb(verbs, 'campbell', 'modal:campbell',
                      'write natural frequencies, damping and whirl over the speed as CSV')
     campbell.add_argument('--rpm', metavar='A:B:N', type=Sweep.parse,

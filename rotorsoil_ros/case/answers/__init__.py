@@ -1,0 +1,1 @@
+"""What a machine answers, by the kind of question."""

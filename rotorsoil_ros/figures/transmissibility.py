@@ -1,0 +1,58 @@
+"""How much of the motion of the ground reaches the bearing housings, over its frequency."""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.channel import ACROSS, across, HOUSING
+from rotorsoil_ros.figures.response import COLOURS, legend_below, tidy
+from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.transmissibility import ALONG, Transmissibility
+from rotorsoil_ros.units import rad_s_to_rpm
+
+_POINTS = 481
+# What is smaller is nothing that anybody would feel.
+_SMALLEST = 1e-2
+_STYLES = ('-', '--', '-.', ':')
+
+
+def transmissibility_figure(case: Case, model: CoupledModel) -> Figure:
+    """
+    Draw the motion of every housing per motion of the ground, a row for each of its directions.
+
+    The rotor turns at the highest speed of the case that all tables of bearings know; what it
+    does to the housings hardly depends on that.
+    """
+    low, high = model.support.known(case.speed_range[1])
+    speed = model.within_tables(case.speed_range)[1]
+    omega = np.linspace(max(low, high / _POINTS), high, _POINTS)
+    found = Transmissibility.of(model, omega, speed=speed)
+    figure = Figure(figsize=(7.5, 6.5), layout='constrained')
+    rows = figure.subplots(len(ACROSS), 1, sharex=True)
+    for axes, axis in zip(rows, ACROSS, strict=True):
+        housings = [across(bearing.name, HOUSING)[ACROSS.index(axis)]
+                    for bearing in case.rotor.bearings]
+        _draw(axes, found[tuple(housings)])
+        axes.set_ylabel(f'housing along {axis} / ground [-]')
+    rows[-1].set_xlabel('frequency of the ground [Hz]')
+    legend_below(figure, *rows, columns=3)
+    figure.suptitle(f'{case.name}: what reaches the housings of ground that moves, rotor at '
+                    f'{rad_s_to_rpm(speed):.4g} rpm', fontsize=10)
+    return figure
+
+
+def _draw(axes: Axes, housings: Transmissibility) -> None:
+    """Draw what each of some housings does of each motion of the ground that it feels."""
+    sizes = housings.amplitude
+    for number, channel in enumerate(housings.channels):
+        for along, colour in enumerate(COLOURS[:len(ALONG)]):
+            values = sizes[:, number, along]
+            if values.max() >= _SMALLEST:
+                axes.semilogy(
+                    housings.frequency_hz, values, linewidth=1.2, color=colour,
+                    linestyle=_STYLES[number % len(_STYLES)],
+                    label=f'{channel.station}, ground along {ALONG[along]}')
+    axes.axhline(1.0, color='grey', linewidth=0.7)
+    axes.set_ylim(bottom=_SMALLEST)
+    tidy(axes)
