@@ -55,4 +55,6 @@ def _draw(axes: Axes, housings: Transmissibility) -> None:
                     label=f'{channel.station}, ground along {ALONG[along]}')
     axes.axhline(1.0, color='grey', linewidth=0.7)
     axes.set_ylim(bottom=_SMALLEST)
+    # Ratios are read as numbers, not as powers.
+    axes.yaxis.set_major_formatter('{x:g}')
     tidy(axes)
