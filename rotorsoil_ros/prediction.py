@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
+# Rows (m,), and real and imaginary parts of their velocity (m, 2, c).
+Ringing: TypeAlias = tuple[IntArray, FloatArray]
+
+
 class Prediction:
     """
     Once-per-turn response of every channel, complex and zero-to-peak.
@@ -27,10 +31,13 @@ class Prediction:
         Rotor speed [rad/s].
     parts : (n, 2, 2, c) float array
         Real parts, then imaginary parts, of displacement and of force.
+    ringing : (rows, (m, 2, c) float array) or None
+        Rows in which what was struck rings at a frequency of its own, and real and imaginary
+        parts of the velocity there.
 
     """
 
-    __slots__ = ('parts', 'speed')
+    __slots__ = ('parts', 'ringing', 'speed')
 
     def __init__(
         self, speed: FloatArray, displacement: ComplexArray, force: ComplexArray,
@@ -38,12 +45,15 @@ class Prediction:
         vectors = np.stack([displacement, force], axis=1)
         self.speed = speed
         self.parts: FloatArray = np.stack([vectors.real, vectors.imag], axis=1)
+        self.ringing: Ringing | None = None
 
     @classmethod
-    def of_parts(cls, speed: FloatArray, parts: FloatArray) -> 'Prediction':
+    def of_parts(
+        cls, speed: FloatArray, parts: FloatArray, ringing: Ringing | None = None,
+    ) -> 'Prediction':
         """Return what consists of these parts, as they are."""
         prediction = cls.__new__(cls)
-        prediction.speed, prediction.parts = speed, parts
+        prediction.speed, prediction.parts, prediction.ringing = speed, parts, ringing
         return prediction
 
     @property
@@ -64,8 +74,12 @@ class Prediction:
 
     @property
     def velocity(self) -> ComplexArray:
-        """Velocity, i speed X, (n, c) [m/s, rad/s]."""
-        return 1j * self.speed[:, None] * self.displacement
+        """Velocity, i speed X where nothing rings, (n, c) [m/s, rad/s]."""
+        velocity = np.asarray(1j * self.speed[:, None] * self.displacement)
+        if self.ringing is not None:
+            rows, parts = self.ringing
+            velocity[rows] = parts[:, 0] + 1j * parts[:, 1]
+        return velocity
 
     def _vector(self, number: int) -> ComplexArray:
         vector = np.empty((len(self.parts), self.parts.shape[3]), dtype=complex)

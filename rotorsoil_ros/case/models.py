@@ -158,7 +158,7 @@ def shape_errors(
 
 def response_key(case: Case, model: CoupledModel) -> str:
     """Return what identifies the response table of a case: all of it but its unbalance."""
-    return content_key('response', TOLERANCE, model.rotor, model.foundations,
+    return content_key('response', 2, TOLERANCE, model.rotor, model.foundations,
                        [_identity(soil) for soil in model.soil_models], case.speed_range,
                        model.couples, model.points)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -292,9 +293,9 @@ class RationalMatrix:
         values /= cauchy.sum(axis=-1)[..., None]
         return np.asarray(values.reshape(*omega.shape, *self.values.shape[1:]))
 
-    def states(self, tolerance: float) -> States:
-        """Return the function by its poles, terms below the tolerance left out."""
-        count, size, _ = self.values.shape
+    def partial_fractions(self) -> tuple[ComplexArray, ComplexArray]:
+        """Return poles (s,) and the residues of all entries, (s, d d)."""
+        count = len(self.nodes)
         arrow = np.zeros((count + 1, count + 1), dtype=complex)
         arrow[0, 1:], arrow[1:, 0] = self.weights, 1.0
         arrow[1:, 1:] = np.diag(self.nodes)
@@ -305,7 +306,13 @@ class RationalMatrix:
         poles = poles[apart > _ON_A_NODE * self.nodes.max()]
         cauchy = 1.0 / (poles[:, None] - self.nodes)
         flat = self.values.reshape(count, -1)
-        residues = (cauchy * self.weights) @ flat / -(cauchy**2 @ self.weights)[:, None]
+        return poles, (cauchy * self.weights) @ flat / -(cauchy**2 @ self.weights)[:, None]
+
+    def states(self, tolerance: float) -> States:
+        """Return the function by its poles, terms below the tolerance left out."""
+        count, size, _ = self.values.shape
+        poles, residues = self.partial_fractions()
+        flat = self.values.reshape(count, -1)
         left, terms, right = np.linalg.svd(residues.reshape(-1, size, size))
         reach = np.abs(poles[:, None] - self.nodes).min(axis=1, initial=np.inf)
         pole, term = np.nonzero(terms > tolerance * reach[:, None])
@@ -319,11 +326,16 @@ def _largest(values: ComplexArray) -> FloatArray:
     return np.asarray(np.abs(values).max(axis=(-2, -1), initial=0.0))
 
 
-def interpolant(
+def interpolant(omega: FloatArray, values: ComplexArray, **limits: Any) -> RationalMatrix:
+    """Return the last of `interpolants`."""
+    return interpolants(omega, values, **limits)[-1][1]
+
+
+def interpolants(
     omega: FloatArray, values: ComplexArray, *, scale: FloatArray, most: int, tolerance: float,
-) -> RationalMatrix:
+) -> list[tuple[float, RationalMatrix]]:
     """
-    Return rational functions with common poles through some samples, close to all others.
+    Return rational functions with common poles through 1, 2, ... samples, close to all others.
 
     Parameters
     ----------
@@ -338,11 +350,16 @@ def interpolant(
     tolerance : float
         Error of all samples that needs no further node: one more would follow round-off.
 
+    Returns
+    -------
+    list of (float, RationalMatrix)
+        Each with its error.
+
     """
     chosen, fits = _greedy(omega, values, scale, most,
                            lambda errors: bool(errors) and errors[-1] <= tolerance)
-    nodes = chosen[:len(fits)]
-    return RationalMatrix(omega[nodes], values[nodes], fits[-1][1])
+    return [(worst, RationalMatrix(omega[chosen[:count]], values[chosen[:count]], weights))
+            for count, (worst, weights) in enumerate(fits, 1)]
 
 
 def _greedy(

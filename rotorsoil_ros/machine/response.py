@@ -1,6 +1,8 @@
 """What the machine answers at any speed, without solving again."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 
 import numpy as np
@@ -11,6 +13,8 @@ from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.machine.pieces import DEGREE, evaluate, evaluate_one, Pieces, refine
+from rotorsoil_ros.machine.transient.poles import Poles, poles_of
+from rotorsoil_ros.machine.transient.state import Deviation
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.units import rad_s_to_rpm
 
@@ -65,6 +69,8 @@ class ResponseTable:
         Where a mode grows on its own: no piece is resolved there, as there is no steady response.
     key : str
         What identifies the computation in the cache; empty if it was not cached.
+    poles : Poles or None
+        Free vibrations that a changing speed strikes; None where nobody asks for them.
 
     """
 
@@ -75,6 +81,7 @@ class ResponseTable:
     accuracy: float
     stability: Stability
     key: str = ''
+    poles: Poles | None = None
 
     @classmethod
     def build(
@@ -130,7 +137,8 @@ class ResponseTable:
         if len(parts) > 1 and not np.any(pieces.resolved):
             raise NotSolvedError('no part of the speed range could be interpolated')
         table = cls(model.channels, model.planes, model.transmits_force, pieces, np.nan, growth)
-        return replace(table, accuracy=table.measure(model))
+        return replace(table, accuracy=table.measure(model),
+                       poles=poles_of(model, speed_range, growth, dense=pieces.edges))
 
     @property
     def speed_range(self) -> tuple[float, float]:
@@ -163,7 +171,21 @@ class ResponseTable:
         vectors = np.full((*weighted.shape[:2], 2 * moving), complex(np.nan, np.nan))
         vectors[..., :moving] = weighted[..., :moving]
         vectors[..., moving:][..., self.transmits_force] = weighted[..., moving:]
-        return Predictor(self, np.concatenate([vectors.real, vectors.imag], axis=-1))
+        return Predictor(self, np.concatenate([vectors.real, vectors.imag], axis=-1),
+                         self._strength(unbalance))
+
+    def _strength(self, unbalance: ComplexArray) -> FloatArray:
+        """Return what real and imaginary parts of deviations do, (2 k, 4 c)."""
+        if self.poles is None:
+            return np.zeros((0, 4 * len(self.channels)))
+        weighted = np.einsum('kpw,p->kw', self.poles.strength, unbalance)
+        moving = len(self.channels)
+        vectors = np.zeros((len(weighted), 2 * moving), dtype=complex)
+        vectors[:, :moving] = weighted[:, :moving]
+        vectors[:, moving:][:, self.transmits_force] = weighted[:, moving:]
+        turned = 1j * vectors
+        return np.concatenate([np.concatenate([part.real, part.imag], axis=1)
+                               for part in (vectors, turned)])
 
     def measure(self, model: CoupledModel) -> float:
         """Return the largest deviation from the exact solution at speeds not yet seen."""
@@ -195,6 +217,7 @@ class ResponseTable:
             'resolved': self.pieces.resolved, 'coefficients': self.pieces.coefficients,
             'accuracy': np.array(self.accuracy),
             'stability': np.array(self.stability.to_json()),
+            **({} if self.poles is None else self.poles.to_arrays()),
         }
 
     @classmethod
@@ -207,7 +230,8 @@ class ResponseTable:
             tuple(str(name) for name in arrays['planes']),
             arrays['transmits_force'],
             Pieces(arrays['edges'], arrays['resolved'], arrays['coefficients']),
-            float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])), key)
+            float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])), key,
+            Poles.from_arrays(arrays) if 'pole_decay' in arrays else None)
 
 
 def growth_of(model: CoupledModel, high: float) -> Stability:
@@ -237,11 +261,14 @@ class Predictor:
         What is looked up.
     coefficients : (k, degree + 1, 4 c) float array
         Real parts of all channels and of all forces, then their imaginary parts.
+    strength : (2 m, 4 c) float array
+        What the real parts of m deviations do to the same, then their imaginary parts.
 
     """
 
     table: ResponseTable
     coefficients: FloatArray
+    strength: FloatArray
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -285,6 +312,49 @@ class Predictor:
         if covered.any():
             parts[covered] = self.predict(speed[covered]).parts
         return Prediction.of_parts(speed, parts)
+
+    def moved(self, steady: Prediction, deviations: Sequence[Deviation]) -> Prediction:
+        """
+        Return a steady response with what a changing speed adds to it.
+
+        Parameters
+        ----------
+        steady : Prediction
+            Of n speeds.
+        deviations : sequence of n deviations
+            As `Transient` tells them; None where there is none.
+
+        Returns
+        -------
+        Prediction
+            The same numbers, to the last bit, however the speeds are divided into calls.
+
+        """
+        rows = np.array([row for row, deviation in enumerate(deviations)
+                         if deviation is not None], dtype=np.int64)
+        if not len(rows):
+            return steady
+        count = len(self.channels)
+        parts, velocity = steady.parts.copy(), np.empty((len(rows), 2, count))
+        motions = self._motions
+        for number, row in enumerate(rows.tolist()):
+            deviation = deviations[row]
+            assert deviation is not None
+            away, changing = (np.concatenate([part.real, part.imag])[:, None]
+                              for part in deviation)
+            # Element by element in one order, unlike those of a matrix product.
+            parts[row] += (away * self.strength).sum(axis=0).reshape(2, 2, count)
+            velocity[number] = (changing * motions).sum(axis=0).reshape(2, count)
+        turning = steady.speed[rows, None]
+        velocity[:, 0] -= turning * parts[rows, 1, 0]
+        velocity[:, 1] += turning * parts[rows, 0, 0]
+        return Prediction.of_parts(steady.speed, parts, (rows, velocity))
+
+    @cached_property
+    def _motions(self) -> FloatArray:
+        """The columns of `strength` that are motions, (2 m, 2 c)."""
+        columns = self.strength.reshape(-1, 2, 2, len(self.channels))[:, :, 0]
+        return columns.reshape(len(self.strength), -1)
 
     def _row(self, speed: float) -> FloatArray:
         pieces = self.table.pieces

@@ -1,0 +1,1 @@
+"""What a machine answers while its speed changes."""
