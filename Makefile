@@ -14,6 +14,9 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 # A sourced ROS of another Python would hide what .venv holds.
 unexport PYTHONPATH AMENT_PREFIX_PATH
 
+# By files: what one test of a file has built the next ones share.
+SPREAD := --numprocesses auto --maxprocesses 4 --dist loadfile
+
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 DOCUMENTED := .venv/.documented
@@ -27,7 +30,7 @@ demo: $(INSTALLED)
 test: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(SPREAD)
 
 docs: $(DOCUMENTED)
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_build/html

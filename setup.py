@@ -75,6 +75,7 @@ setup(
             'pandas>=2.0',
             'pyarrow>=14.0.1',
             'pytest>=8.2',
+            'pytest-xdist>=3.6',
             'pyuff>=2.4.6',
             'rosbags>=0.11.0',
             'ruff>=0.6',

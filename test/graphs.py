@@ -12,8 +12,8 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from rotorsoil_ros.domain import own_domain
 from rotorsoil_ros.node.node import RotorsoilNode
-from rotorsoil_ros.testing.graph import DOMAIN
 from rotorsoil_ros.wire.messages import moduli, phases
 
 STAMP = 1_700_000_000_000_000_001
@@ -104,7 +104,7 @@ class Processes:
         for argument in (*self.parameters, *parameters):
             command += ['-p', argument]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True,
-                                   env={**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN)})
+                                   env={**os.environ, 'ROS_DOMAIN_ID': str(own_domain())})
         self.running.append(process)
         told = []
         for line in process.stderr:

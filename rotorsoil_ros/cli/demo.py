@@ -22,6 +22,7 @@ from rotorsoil_ros.case.config import Case, load
 from rotorsoil_ros.channel import across, Channel, HOUSING
 from rotorsoil_ros.cli.demo_comparison import demonstrate_comparison
 from rotorsoil_ros.cli.progress import progress
+from rotorsoil_ros.domain import own_domain
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.figures.response import all_figures, trend
@@ -37,7 +38,6 @@ _RUN_UP_S, _DWELL_S, _COAST_S, _RATE_HZ = 12.0, 3.0, 9.0, 100
 _SLOWEST_RPM, _FASTEST_RPM = 300.0, 8400.0
 
 _SHUTDOWN_S = 60.0  # for what hangs: a busy machine takes its time
-_ONE_DOMAIN_OF = 100
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,7 @@ def speed_profile(start_ns: int) -> tuple[IntArray, FloatArray]:
 def _live(case: Path, profile: Path, out: Path, directory: Path) -> Path:
     """Let the replay talk to the node; return the directory of the node's log."""
     environment = {**os.environ, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-    # Programs on one domain hear each other: the demo takes one that nobody was given.
-    environment.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _ONE_DOMAIN_OF))
+    environment.setdefault('ROS_DOMAIN_ID', str(own_domain()))
     before = set(out.iterdir())
     with _node(case, out, directory, environment):
         replay = subprocess.run(

@@ -1,7 +1,6 @@
 """A ROS graph that nobody else sees: its context, who spins it, and a probe that talks in it."""
 
 from collections.abc import Callable
-import os
 import time
 from typing import Any, TypeVar
 import warnings
@@ -13,6 +12,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from rotorsoil_ros.domain import own_domain
+
 with warnings.catch_warnings():
     warnings.simplefilter('ignore', DeprecationWarning)  # lark still imports sre_parse
     import rosidl_generator_py  # noqa: F401 - rclpy imports it with the first message
@@ -21,8 +22,6 @@ AnyNode = TypeVar('AnyNode', bound=Node)
 
 # For what hangs: a test is not about how fast something is.
 DEADLINE_S = 600.0
-# Of this process; its ports stay below those that the system hands out.
-DOMAIN = 1 + os.getpid() % 100
 RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED_INPUT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SPIN_ONCE_S = 0.05
@@ -36,9 +35,9 @@ class Graph:
     only a hang reaches.
     """
 
-    def __init__(self, *, domain: int = DOMAIN) -> None:
+    def __init__(self, *, domain: int | None = None) -> None:
         self.context = Context()
-        rclpy.init(args=[], context=self.context, domain_id=domain)
+        rclpy.init(args=[], context=self.context, domain_id=domain or own_domain())
         self.executor: Any = EventsExecutor(context=self.context)
         self.nodes: list[Node] = []
         self.heard: dict[str, list[Any]] = {}

@@ -20,8 +20,9 @@ from std_srvs.srv import Trigger
 
 from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.retention import new_directory
+from rotorsoil_ros.domain import own_domain
 from rotorsoil_ros.node.node import Survived
-from rotorsoil_ros.testing.graph import DEADLINE_S, DOMAIN
+from rotorsoil_ros.testing.graph import DEADLINE_S
 
 from graphs import assert_answers, Bench, exact, joint_state, LATCHED, STAMP, stamp_ns
 from records import topics_of
@@ -242,7 +243,7 @@ def test_a_namesake_is_noticed_and_told_once(bench, capfd, monkeypatch):
         return '2 nodes are called /hall/rotorsoil' in ''.join(told)
 
     other = Context()
-    rclpy.init(context=other, domain_id=DOMAIN)
+    rclpy.init(context=other, domain_id=own_domain())
     namesake = Node('rotorsoil', namespace=hall, context=other)
     bench.graph.until(is_told, 'the error')
     for _ in range(3):

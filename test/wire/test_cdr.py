@@ -84,7 +84,8 @@ def test_padding_does_not_make_a_layout_different():
 @pytest.mark.parametrize('other', [
     message_of(['motor'], [1.0]), message_of(['rotor', 'b'], [1.0, 2.0]),
     message_of(['rotor'], [1.0], position=[2.0]), message_of(['rotor'], []),
-    message_of(['rotor'], [], position=[1.0]), message_of(['rotor'], [1.0]) + bytes(8)])
+    message_of(['rotor'], [], position=[1.0]), message_of(['rotor'], [1.0]) + bytes(8)],
+    ids=['another name', 'two joints', 'a position', 'no velocity', 'a position only', 'longer'])
 def test_other_names_and_other_counts_are_another_layout(other):
     assert not Layout.of(JOINT_STATE, message_of(['rotor'], [1.0])).fits(other)
 
