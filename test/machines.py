@@ -1,10 +1,13 @@
 """The seed paper's machine, and pieces of it, for the tests."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
 
 from rotorsoil_ros.channel import DOFS
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -134,3 +137,16 @@ def two_blocks(cross=0.0):
 def channel(model, prediction, name):
     """Return the displacement of one channel."""
     return prediction.displacement[:, model.channels.index(name)]
+
+
+PLACES = ((4.0, 0.5), (-1.5, 1.6))
+
+
+def shared(points=PLACES, highest=320.0):
+    """Return the machine on two blocks with one ground below both."""
+    model = two_blocks()
+    site = Site.of(tuple(block.contact for block in model.foundations),
+                   tuple((0.0, block.centre_y) for block in model.foundations), points)
+    ground = BoundaryElementModel.solved_together(SOIL, site, omega_max=highest)
+    names = ('yard', 'wall')[:len(points)]
+    return replace(model, soil_models=(ground,), points=names)

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_shared_ground import shared
 
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.placement import Placement
 
-from machines import elastic_machine, paper_machine, paper_rotor, Springs, two_blocks
+from machines import elastic_machine, paper_machine, paper_rotor, shared, Springs, two_blocks
 
 AXES = ('x', 'y', 'z')
 

@@ -7,7 +7,6 @@ import pytest
 
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
-from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.plan import Part, Plan
 from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.band import on_soils
@@ -16,22 +15,11 @@ from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 
-from machines import channel, SOIL, two_blocks
+from machines import channel, shared, SOIL, two_blocks
 from oracles.dense import dense_response
 
 SPEEDS = np.linspace(1.0, 300.0, 41)
 UNBALANCE = np.array([1e-3, 4e-4 * np.exp(1.1j)])
-PLACES = ((4.0, 0.5), (-1.5, 1.6))
-
-
-def shared(points=PLACES, highest=320.0):
-    """Return the machine on two blocks with one ground below both."""
-    model = two_blocks()
-    site = Site.of(tuple(block.contact for block in model.foundations),
-                   tuple((0.0, block.centre_y) for block in model.foundations), points)
-    ground = BoundaryElementModel.solved_together(SOIL, site, omega_max=highest)
-    names = ('yard', 'wall')[:len(points)]
-    return replace(model, soil_models=(ground,), points=names)
 
 
 @pytest.fixture(scope='module')
