@@ -26,9 +26,9 @@ class BlockEntries:
         """Return the blocks, or None where one is at fault."""
         entries = self.faults.entries.foundations
         blocks = self.faults.attempt_each(self._foundation, entries)
-        if blocks is None or self._is_undecided:
-            return blocks
-        return self.faults.attempt(lambda: self._apart(blocks))
+        if blocks is not None and all(map(self._stands, entries)):
+            self.faults.attempt(lambda: self._refuse_overlap(blocks))
+        return blocks
 
     @property
     def _is_undecided(self) -> bool:
@@ -37,9 +37,18 @@ class BlockEntries:
         return len(entries.foundations) > 1 and any(
             bearing.foundation is None for bearing in entries.rotor.bearings)
 
-    def _apart(self, blocks: tuple[Foundation, ...]) -> tuple[Foundation, ...]:
-        self._refuse_overlap(blocks)
-        return blocks
+    def _seats(self, entry: schema.FoundationEntry) -> list[float]:
+        """Return where the bearings of a block stand along the shaft [m]."""
+        entries = self.faults.entries
+        # A bearing that names no block stands on the only one.
+        own = (entry.name, None) if len(entries.foundations) == 1 else (entry.name,)
+        return [bearing.position for bearing in entries.rotor.bearings
+                if bearing.foundation in own]
+
+    def _stands(self, entry: schema.FoundationEntry) -> bool:
+        """Whether it is known where a block stands."""
+        return entry.centre_y is not None or (
+            bool(self._seats(entry)) and not self._is_undecided)
 
     def _refuse_overlap(self, foundations: tuple[Foundation, ...]) -> None:
         """Raise an InputError at the second of two blocks that stand on the same ground."""
@@ -56,24 +65,19 @@ class BlockEntries:
                         f'{" along y" if x == 0.0 else ""}: centres are {where} apart')
 
     def _foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
-        blocks = self.faults.entries.foundations
-        # A bearing that names no block stands on the only one.
-        own = (entry.name, None) if len(blocks) == 1 else (entry.name,)
-        bearings = self.faults.entries.rotor.bearings
-        seats = [bearing.position for bearing in bearings if bearing.foundation in own]
-        if not seats and self._is_undecided:
-            seats = [0.0]  # never used: which bearing has to choose has been kept
+        seats = self._seats(entry)
         coupled = self.faults.entries.support.model == BOUNDARY_ELEMENTS
-        if not seats and not (coupled and entry.centre_y is not None):
-            raise self.faults.error('foundations', index, problem=(
+        if not seats and not self._is_undecided and not (
+                coupled and entry.centre_y is not None):
+            self.faults.found.append(self.faults.error('foundations', index, problem=(
                 f'no bearing stands on {entry.name}' + ('; a block beside the machine needs '
-                                                        'centre_y in m' if coupled else '')))
+                                                        'centre_y in m' if coupled else ''))))
         with self.faults.at('foundations', index, entry=entry):
             contact = self._contact(index, entry)
             mass, centre, inertia = self._body(index, entry, contact)
             along = entry.centre_y
-            if along is None:
-                along = 0.5 * (min(seats) + max(seats))
+            if along is None:  # without a seat it is never used: what is wrong has been kept
+                along = 0.5 * (min(seats) + max(seats)) if seats else 0.0
             # A plan turns about its centroid; its parts are placed about the keys' centre.
             x, y = contact.centroid if isinstance(contact, Plan) else (0.0, 0.0)
             product = 0.0

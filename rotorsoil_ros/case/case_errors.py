@@ -25,6 +25,19 @@ def message(path: Path, place: Place, problem: str) -> str:
     return ': '.join(filter(None, (str(path), '.'.join(words), problem)))
 
 
+class CaseError(InputError):
+    """What is wrong at one key of a file, in one line."""
+
+    def __init__(self, path: Path, place: Place, problem: str) -> None:
+        super().__init__(message(path, place, problem))
+        self.place = place
+
+
+def place_of(error: InputError) -> Place:
+    """Return at which key a case is at fault, nowhere where another file is."""
+    return error.place if isinstance(error, CaseError) else ()
+
+
 @dataclass(frozen=True)
 class Faults:
     """
@@ -36,37 +49,31 @@ class Faults:
         The file.
     entries : schema.Document
         What it says.
-    found : list of str
+    found : list of InputError
         Faults that were met so far, a line each.
 
     """
 
     path: Path
     entries: schema.Document
-    found: list[str] = field(default_factory=list)
+    found: list[InputError] = field(default_factory=list)
 
     def attempt(self, build: Callable[[], T]) -> T | None:
         """Return what is built, or keep what is wrong with it for later, and return None."""
         try:
             return build()
         except InputError as error:
-            self.found.append(str(error))
+            self.found.append(error)
             return None
 
     def attempt_each(
         self, build: Callable[[int, E], T], entries: Iterable[E],
     ) -> tuple[T, ...] | None:
         """Return what is built of every entry, or None if one is at fault."""
-        before = len(self.found)
         built = [self.attempt(partial(build, index, entry))
                  for index, entry in enumerate(entries)]
-        return tuple(one for one in built if one is not None) if (
-            len(self.found) == before) else None
-
-    def tell(self) -> None:
-        """Raise an InputError with every fault that was found, a line each."""
-        if self.found:
-            raise InputError('\n'.join(dict.fromkeys(self.found)))
+        sound = tuple(one for one in built if one is not None)
+        return sound if len(sound) == len(built) else None
 
     @contextmanager
     def at(self, *place: int | str, entry: Entry | None = None) -> Iterator[None]:
@@ -86,19 +93,20 @@ class Faults:
                 problem = problem.removeprefix(f'{found[1]} ')
             raise self.error(*place, problem=problem) from error
 
-    def error(self, *place: int | str, problem: str) -> InputError:
+    def error(self, *place: int | str, problem: str) -> CaseError:
         """Return the error to raise at a key."""
-        return InputError(message(self.path, place, problem))
+        return CaseError(self.path, place, problem)
 
-    def refuse_repeated_names(self) -> None:
-        """Raise an InputError at the second of two stations of one name."""
+    def names_differ(self) -> bool:
+        """Return whether no two stations have one name; the second of them is a fault."""
         seen: dict[str, Place] = {}
         for place, name in self._stations():
             if name in seen:
                 first = '.'.join(map(str, seen[name]))
-                raise self.error(*place, 'name', problem=f'must differ from that of {first}, '
-                                                         f'got {name} twice')
-            seen[name] = place
+                self.found.append(self.error(
+                    *place, 'name', problem=f'must differ from that of {first}, got {name} twice'))
+            seen.setdefault(name, place)
+        return len(seen) == len(self._stations())
 
     def _stations(self) -> list[tuple[Place, str]]:
         rotor = self.entries.rotor

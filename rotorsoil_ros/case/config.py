@@ -1,7 +1,6 @@
 """Which machine a case file describes."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,21 +11,25 @@ from pydantic import ValidationError
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case import cache, document, schema, stiffness_file
 from rotorsoil_ros.case.block_entries import BlockEntries
-from rotorsoil_ros.case.case_errors import Faults, message
-from rotorsoil_ros.case.entries.entry import faults
-from rotorsoil_ros.case.entries.ground import GroundEntries, THIN_LAYERS
+from rotorsoil_ros.case.case_errors import CaseError, Faults
+from rotorsoil_ros.case.entries.entry import faults, Place
+from rotorsoil_ros.case.entries.ground import (
+    GroundEntries,
+    infinite_range,
+    proportions,
+    THIN_LAYERS,
+)
+from rotorsoil_ros.case.entries.mending import all_faults
 from rotorsoil_ros.case.entries.sensors import Sensors, sensors_of
 from rotorsoil_ros.case.entries.site import GroundProbe, SiteEntries
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
 from rotorsoil_ros.channel import Channel, DOFS
-from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.elements.table import require_kind
-from rotorsoil_ros.ground.half_space import a0_range
-from rotorsoil_ros.ground.layers.model import Proportions
 from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
-from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil
+from rotorsoil_ros.ground.soil import RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
@@ -137,35 +140,8 @@ _BURSTING = 1500.0
 # A wider shaft was given in mm [m].
 _WIDEST = 3.0
 
-# Natural modes above the running speed and excitation at twice the speed need the soil too.
-_HIGHEST_ORDER = 2.0
-
-
-def infinite_range(
-    soil: Soil, contact: Contact, geometry: str, speed_range: tuple[float, float],
-) -> tuple[float, float]:
-    """Return the frequencies [rad/s] that infinite elements have to cover for some speeds."""
-    low, high = speed_range
-    # A disc is known down to rest; a strip has no static stiffness.
-    lowest = 0.0 if geometry == 'disc' else low
-    a0_range(soil, contact, geometry, omega_min=lowest, omega_max=high)
-    with suppress(RotorSoilError):  # at such speeds the running frequency has to do
-        a0_range(soil, contact, geometry, omega_min=lowest, omega_max=_HIGHEST_ORDER * high)
-        return lowest, _HIGHEST_ORDER * high
-    return lowest, high
-
-
-def proportions(
-    ground: LayeredSoil, contact: Contact, embedment: Embedment,
-    speed_range: tuple[float, float],
-) -> Proportions:
-    """Return what a table of layered ground has to cover for some speeds [rad/s]."""
-    high = speed_range[1]
-    found = Proportions.of(ground, contact, embedment, omega_max=high)
-    with suppress(RotorSoilError):  # at such speeds the running frequency has to do
-        return Proportions.of(ground, contact, embedment, omega_max=_HIGHEST_ORDER * high)
-    return found
-
+# Keys that say what films carry, and how fast it turns.
+_CARRIED = ('rotor', 'speed_range_rpm')
 
 def load(
     path: Path, overrides: Sequence[str] = (), *, cache_directory: Path | None = None,
@@ -217,29 +193,46 @@ def case_of(
         As `load`.
 
     """
-    try:
-        entries = schema.Document.model_validate(content)
-    except ValidationError as error:
-        raise InputError('\n'.join(
-            message(path, place, problem) for place, problem in faults(error))) from error
-    return _Builder(Faults(path, entries), content, dict(files or {}), cache_directory).case()
+    def read(
+        content: dict[str, Any], mended: frozenset[Place] = frozenset(),
+    ) -> tuple[Case | None, list[InputError]]:
+        try:
+            entries = schema.Document.model_validate(content)
+        except ValidationError as error:
+            return None, [CaseError(path, place, problem) for place, problem in faults(error)]
+        told = Faults(path, entries)
+        builder = _Builder(told, content, dict(files or {}), cache_directory,
+                           solves_films=not any(place[0] in _CARRIED for place in mended))
+        return builder.case(), told.found
+
+    case, found = read(content)
+    if case is None or found:
+        raise InputError('\n'.join(map(str, all_faults(
+            schema.Document, content, found, lambda *mended: read(*mended)[1]))))
+    return case
 
 
 @dataclass(frozen=True)
 class _Builder:
-    """Builds the physics of a document and says at which key it was refused."""
+    """
+    Builds the physics of a document and says at which key it was refused.
+
+    Films that carry what nobody has said take a second each and tell nothing: they are solved
+    only where the rotor is that of the file.
+    """
 
     faults: Faults
     content: Mapping[str, Any]
     files: dict[str, str]
     cache_directory: Path | None
+    solves_films: bool
 
-    def case(self) -> Case:
-        """Return the machine, or raise one InputError with all that is wrong with it."""
+    def case(self) -> Case | None:
+        """Return the machine, or None where something is wrong with it; that is in the faults."""
         faults, entries = self.faults, self.faults.entries
         on = GroundEntries(faults)
         ground = faults.attempt(on.ground)
-        faults.attempt(faults.refuse_repeated_names)
+        names_differ = faults.names_differ()
         faults.attempt(self._refuse_unused_files)
         faults.attempt(on.refuse_unfit_support)
         faults.attempt(on.refuse_unfit_spread)
@@ -253,25 +246,22 @@ class _Builder:
         probes = faults.attempt(SiteEntries(faults).probes)
         unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
         unbalance = unbalances.total()
-        tables = None if speed_range is None else faults.attempt(
-            lambda: self._tables(speed_range))
+        tables = None if speed_range is None else self._tables(speed_range)
         journals = None
         if rotor is not None and speed_range is not None:
             journals = self._journals().journals(rotor, speed_range)
         oils = faults.attempt(self._journals().oil_temperatures)
         uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
-        faults.tell()
-        assert rotor is not None
-        assert foundations is not None
-        assert embedments is not None
-        assert probes is not None
-        assert unbalance is not None
-        assert speed_range is not None
-        assert tables is not None
-        assert journals is not None
-        assert oils is not None
-        assert uncertainty is not None
-        assert zones is not None
+        model, sensors = None, None
+        if names_differ and rotor is not None and foundations is not None:
+            model = self._model(rotor, foundations, unbalances.couples())
+        if model is not None and probes is not None:
+            sensors = sensors_of(faults, [*model.channels, *(
+                Channel(probe.name, '', axis) for probe in probes for axis in DOFS[:3])])
+        if (rotor is None or foundations is None or embedments is None or probes is None
+                or unbalance is None or speed_range is None or tables is None or oils is None
+                or journals is None or uncertainty is None or zones is None or sensors is None):
+            return None
         layered = ground if isinstance(ground, LayeredSoil) else None
         soil = ground.at(max((one.depth for one in embedments), default=0.0)) if (
             isinstance(ground, LayeredSoil)) else ground
@@ -280,18 +270,29 @@ class _Builder:
             embedments=embedments, support=entries.support, foundations=foundations,
             rotor=floated(rotor, journals), unbalance=unbalance, couples=unbalances.couples(),
             speed_range=speed_range, ground_probes=probes, tables=tables,
-            uncertainty=uncertainty, zones=zones, journals=journals, oil_temperatures=oils,
-            cache_directory=self.cache_directory, content=self.content, files=self.files)
-        with faults.at('rotor', entry=entries.rotor):
-            model = CoupledModel(case.rotor, case.foundations,
-                                 [RigidSoil() for _ in case.foundations], case.couples)
-            self._refuse_size(model)
-        self._refuse_unreachable_soil(case)
-        return replace(case, sensors=sensors_of(faults, [*model.channels, *(
-            Channel(probe.name, '', axis) for probe in probes for axis in DOFS[:3])]))
+            uncertainty=uncertainty, zones=zones, sensors=sensors, journals=journals,
+            oil_temperatures=oils, cache_directory=self.cache_directory, content=self.content,
+            files=self.files)
+        if not faults.found:
+            self._refuse_unreachable_soil(case)
+        return case
+
+    def _model(
+        self, rotor: Rotor, foundations: tuple[Foundation, ...], couples: tuple[str, ...],
+    ) -> CoupledModel | None:
+        """Return the machine without its ground, which has its channels."""
+        def model() -> CoupledModel:
+            with self.faults.at('rotor', entry=self.faults.entries.rotor):
+                found = CoupledModel(rotor, foundations, [RigidSoil() for _ in foundations],
+                                     couples)
+                self._refuse_size(found)
+                return found
+
+        return self.faults.attempt(model)
 
     def _journals(self) -> JournalEntries:
-        return JournalEntries(self.faults, cache.directory(self.cache_directory))
+        return JournalEntries(self.faults, cache.directory(self.cache_directory),
+                              self.solves_films)
 
     def _refuse_bursting_speed(self, rotor: Rotor) -> None:
         """Raise an InputError at a speed that no shaft of this diameter survives."""
@@ -326,13 +327,13 @@ class _Builder:
                 raise self.faults.error(*place, problem='belongs to the support model table, '
                                                         f'got {entries.support.model}')
 
-    def _tables(self, speed_range: tuple[float, float]) -> tuple[ComplianceTable, ...]:
-        """Return what the blocks stand on where a file says it."""
+    def _tables(self, speed_range: tuple[float, float]) -> tuple[ComplianceTable, ...] | None:
+        """Return what the blocks stand on where a file says it, or None where one is at fault."""
         entries = self.faults.entries
         if entries.support.model != 'table':
             return ()
-        tables = []
-        for block in entries.foundations:
+
+        def table(_: int, block: schema.FoundationEntry) -> ComplianceTable:
             file = block.stiffness_file or entries.support.file
             if file is None:
                 raise self.faults.error('support', 'file', problem='is missing; the support model '
@@ -341,26 +342,30 @@ class _Builder:
             path = self.faults.path.parent / file
             if file not in self.files:
                 self.files[file] = stiffness_file.text_of(path)
-            tables.append(stiffness_file.read(
-                path, speed_range, text=self.files[file],
-                cut_offs_hz=entries.support.cut_offs_hz or ()))
-        return tuple(tables)
+            return stiffness_file.read(path, speed_range, text=self.files[file],
+                                       cut_offs_hz=entries.support.cut_offs_hz or ())
+
+        return self.faults.attempt_each(table, entries.foundations)
 
     def _refuse_unreachable_soil(self, case: Case) -> None:
-        if case.support.model == THIN_LAYERS and case.ground is not None:
-            for index, foundation in enumerate(case.foundations):
-                with self.faults.at('foundations', index):
-                    proportions(case.ground, foundation.contact, case.embedments[index],
-                                case.speed_range)
-        SiteEntries(self.faults).refuse_unreachable(case)
-        if case.support.model != 'infinite_elements' or case.soil is None:
-            return
-        geometry = case.support.geometry
-        with self.faults.at('soil', entry=self.faults.entries.soil):
-            require_kind(geometry, case.soil.poisson_ratio, case.soil.loss_factor)
-        for index, foundation in enumerate(case.foundations):
+        """Keep a fault for every block below which the method would not reach far enough."""
+        model, soil, ground = case.support.model, case.soil, case.ground
+
+        def kind() -> None:
+            with self.faults.at('soil', entry=self.faults.entries.soil):
+                if model == 'infinite_elements' and soil is not None:
+                    require_kind(case.support.geometry, soil.poisson_ratio, soil.loss_factor)
+
+        def reach(index: int, block: Foundation) -> None:
             with self.faults.at('foundations', index):
-                infinite_range(case.soil, foundation.contact, geometry, case.speed_range)
+                if model == THIN_LAYERS and ground is not None:
+                    proportions(ground, block.contact, case.embedments[index], case.speed_range)
+                elif model == 'infinite_elements' and soil is not None:
+                    infinite_range(soil, block.contact, case.support.geometry, case.speed_range)
+
+        self.faults.attempt(kind)
+        self.faults.attempt_each(reach, case.foundations)
+        self.faults.attempt(lambda: SiteEntries(self.faults).refuse_unreachable(case))
 
     def _uncertainty(self) -> SoilSpread:
         entry = self.faults.entries.uncertainty

@@ -143,11 +143,14 @@ class JournalEntries:
         Of the case.
     directory : Path
         Of the cache.
+    solves : bool
+        Whether films are solved; else only what is said of them is looked at.
 
     """
 
     faults: Faults
     directory: Path
+    solves: bool = True
 
     def journals(
         self, rotor: Rotor, speed_range: tuple[float, float],
@@ -163,8 +166,10 @@ class JournalEntries:
         loads = self.faults.attempt(lambda: self._loads(rotor))
         if loads is None:
             return None
-        return self.faults.attempt_each(
-            lambda _, index: self._journal(index, loads[index], speed_range), places)
+        before = len(self.faults.found)
+        found = [self.faults.attempt(partial(self._journal, index, loads[index], speed_range))
+                 for index in places]
+        return None if len(self.faults.found) > before else tuple(filter(None, found))
 
     def oil_temperatures(self) -> tuple[float, ...]:
         """Return for which temperatures of the oil tables are wanted besides, rising."""
@@ -188,7 +193,7 @@ class JournalEntries:
 
     def _journal(
         self, index: int, load: FloatArray, speed_range: tuple[float, float],
-    ) -> Journal:
+    ) -> Journal | None:
         entry = self.faults.entries.rotor.bearings[index]
         assert entry.journal is not None
         place = ('rotor', 'bearings', index, 'journal')
@@ -197,6 +202,8 @@ class JournalEntries:
         least = THINNEST if entry.journal.least_film is None else entry.journal.least_film
         with self.faults.at(*place, entry=entry.journal):
             require(0.0 < least < math.inf, 'least_film', '> 0 m and finite', least)
+            if not self.solves:
+                return None
             with solved(f'the film of {entry.name}'):
                 states = self._states(bearing, viscosity, load, speed_range)
         return Journal(entry.name, viscosity, oil, least, states)

@@ -9,7 +9,7 @@ from rotorsoil_ros.background import Child, Children, run_as_child
 from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.design import tables
-from rotorsoil_ros.case.entries.ground import THIN_LAYERS
+from rotorsoil_ros.case.entries.ground import infinite_range, proportions, THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of, site_reach
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
@@ -49,7 +49,7 @@ def soil_keys(case: config.Case) -> list[str]:
     """Return what identifies the tables of the ground that a case needs."""
     geometry, soil = case.support.geometry, case.soil
     if case.support.model == THIN_LAYERS and case.ground is not None:
-        return [tables.layers_key(config.proportions(
+        return [tables.layers_key(proportions(
             case.ground, block.contact, embedment, case.speed_range))
             for block, embedment in zip(case.foundations, case.embedments, strict=True)]
     if case.support.model == BOUNDARY_ELEMENTS and soil is not None:
@@ -60,7 +60,7 @@ def soil_keys(case: config.Case) -> list[str]:
         return []
     keys = []
     for foundation in case.foundations:
-        low, high = config.infinite_range(soil, foundation.contact, geometry, case.speed_range)
+        low, high = infinite_range(soil, foundation.contact, geometry, case.speed_range)
         covered = a0_range(soil, foundation.contact, geometry, omega_min=low, omega_max=high)
         keys.append(tables.compliance_key(soil, geometry, *covered))
     return keys

@@ -13,7 +13,7 @@ import numpy as np
 import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
-from rotorsoil_ros.case.config import Case, proportions
+from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.ground import band_contents
 from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
@@ -21,7 +21,7 @@ from rotorsoil_ros.case.design.tables import (
     key_of,
     thin_layer_model,
 )
-from rotorsoil_ros.case.entries.ground import THIN_LAYERS
+from rotorsoil_ros.case.entries.ground import proportions, THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.summary import stability_doubts, unstable
 from rotorsoil_ros.errors import InputError, RotorSoilError, solved

@@ -1,5 +1,6 @@
 """In which unit a value of a case file is, and which values are refused at once."""
 
+from dataclasses import dataclass
 from functools import cache
 import math
 import re
@@ -123,29 +124,42 @@ def _file(value: object) -> str:
     return value
 
 
-Name = Annotated[str, BeforeValidator(_name)]
-FileName = Annotated[str, BeforeValidator(_file)]
-Count = Annotated[int, BeforeValidator(_count)]
-Ratio = Annotated[float, _number_in('')]
-Metre = Annotated[float, _number_in('m')]
-MetreOrEndless = Annotated[float, _number_in('m', may_be_endless=True)]
-MetrePerSecond = Annotated[float, _number_in('m/s')]
-MetrePerSecondSquared = Annotated[float, _number_in('m/s^2')]
-Kilogram = Annotated[float, _number_in('kg')]
-Kilowatt = Annotated[float, _number_in('kW')]
-KilogramPerMetre = Annotated[float, _number_in('kg/m')]
-KilogramMetre = Annotated[float, _number_in('kg m')]
-KilogramSquareMetre = Annotated[float, _number_in('kg m^2')]
-KilogramPerCubicMetre = Annotated[float, _number_in('kg/m^3')]
-Pascal = Annotated[float, _number_in('Pa')]
-NewtonPerMetre = Annotated[float, _number_in('N/m')]
-NewtonSecondPerMetre = Annotated[float, _number_in('N s/m')]
-Newton = Annotated[float, _number_in('N')]
-PascalSecond = Annotated[float, _number_in('Pa s')]
-Degree = Annotated[float, _number_in('deg')]
-Celsius = Annotated[float, _number_in('degC')]
-Radian = Annotated[float, _number_in('rad')]
-Hertz = Annotated[float, _number_in('Hz')]
-Rpm = Annotated[float, _number_in('rpm')]
-BalanceGrade = Annotated[float, BeforeValidator(_grade)]
-OilGrade = Annotated[int, BeforeValidator(_oil_grade)]
+@dataclass(frozen=True, init=False)
+class Usual:
+    """Values that things of a kind have; what is wrong with a file is searched for with them."""
+
+    values: tuple[object, ...]
+
+    def __init__(self, *values: object) -> None:
+        object.__setattr__(self, 'values', values)
+
+
+A_NAME = Usual('stand_in')
+Name = Annotated[str, BeforeValidator(_name), A_NAME]
+FileName = Annotated[str, BeforeValidator(_file), Usual('stand_in.csv', 'stand_in_too.csv')]
+Count = Annotated[int, BeforeValidator(_count), Usual(4, 5, 9, 1, 31)]
+Ratio = Annotated[float, _number_in(''), Usual(0.3, 0.0, 1.0, 0.1, 2.0)]
+Metre = Annotated[float, _number_in('m'), Usual(0.1, 1.0, 0.0, 0.5, 6.0)]
+Clearance = Annotated[float, _number_in('m'), Usual(1e-4, 2e-5, 1e-3, 5e-4, 5e-6)]
+MetreOrEndless = Annotated[float, _number_in('m', may_be_endless=True), Usual(1.0, 0.2, 30.0)]
+MetrePerSecond = Annotated[float, _number_in('m/s'), Usual(150.0, 2e-3, 5e-3, 9e-3, 700.0)]
+MetrePerSecondSquared = Annotated[float, _number_in('m/s^2'), Usual(20.0, 500.0)]
+Kilogram = Annotated[float, _number_in('kg'), Usual(500.0, 20.0, 4e4, 1.0, 0.0)]
+Kilowatt = Annotated[float, _number_in('kW'), Usual(75.0, 4.0)]
+KilogramPerMetre = Annotated[float, _number_in('kg/m'), Usual(0.0, 10.0)]
+KilogramMetre = Annotated[float, _number_in('kg m'), Usual(0.01, 1e-4, 1.0, 0.0)]
+KilogramSquareMetre = Annotated[float, _number_in('kg m^2'), Usual(50.0, 1.0, 2e4, 0.01, 0.0)]
+KilogramPerCubicMetre = Annotated[
+    float, _number_in('kg/m^3'), Usual(2000.0, 1600.0, 7850.0, 2400.0)]
+Pascal = Annotated[float, _number_in('Pa'), Usual(5e7, 2e8, 2e11, 1e9, 2e7)]
+NewtonPerMetre = Annotated[float, _number_in('N/m'), Usual(1e8, 1e6, 2e9, 0.0)]
+NewtonSecondPerMetre = Annotated[float, _number_in('N s/m'), Usual(1e4, 100.0, 1e6, 0.0)]
+Newton = Annotated[float, _number_in('N'), Usual(-3000.0, 0.0, -50.0)]
+PascalSecond = Annotated[float, _number_in('Pa s'), Usual(0.02, 0.06, 0.005)]
+Degree = Annotated[float, _number_in('deg'), Usual(60.0, 20.0, 120.0)]
+Celsius = Annotated[float, _number_in('degC'), Usual(45.0, 60.0, 30.0)]
+Radian = Annotated[float, _number_in('rad'), Usual(0.0, 1.0, 3.0)]
+Hertz = Annotated[float, _number_in('Hz'), Usual(20.0, 5.0, 80.0)]
+Rpm = Annotated[float, _number_in('rpm'), Usual(1000.0, 100.0, 3000.0, 0.0, 2e4)]
+BalanceGrade = Annotated[float, BeforeValidator(_grade), Usual('G6.3', 'G2.5')]
+OilGrade = Annotated[int, BeforeValidator(_oil_grade), Usual(46, 32, 68)]

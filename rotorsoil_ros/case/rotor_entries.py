@@ -28,8 +28,7 @@ from rotorsoil_ros.rotor.disc import Disc, permissible_unbalance
 from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 from rotorsoil_ros.units import rpm_to_rad_s
 
-_INERTIAS = ('mass', 'diametral_inertia', 'polar_inertia')
-_DIMENSIONS = ('outer_diameter', 'inner_diameter', 'width', 'density')
+_INERTIAS, _DIMENSIONS = schema.DiscEntry.ways
 
 # More than anybody could solve.
 _MOST_SHAFT_NODES = 2000
@@ -145,12 +144,16 @@ class RotorEntries:
 
     def _foundation_of(self, place: Place, entry: BearingEntry) -> str | None:
         blocks = self.faults.entries.foundations
+        names = [block.name for block in blocks]
+        if entry.foundation is not None and entry.foundation not in names:
+            raise self.faults.error(*place, 'foundation', problem=(
+                f'must be one of {", ".join(names)}, got {entry.foundation}' if names else
+                f'names a block, of which there is none, got {entry.foundation}'))
         if entry.foundation is not None or not blocks:
             return entry.foundation
         if len(blocks) > 1:
-            names = ', '.join(block.name for block in blocks)
-            raise self.faults.error(*place, 'foundation',
-                                    problem=f'is missing; there are several: {names}')
+            raise self.faults.error(*place, 'foundation', problem=(
+                f'is missing; there are several: {", ".join(names)}'))
         return blocks[0].name
 
     def _matrix(
@@ -233,8 +236,9 @@ class Unbalances:
     def _vector(self, index: int, entry: schema.UnbalanceEntry) -> complex:
         discs = [disc.name for disc in self.faults.entries.rotor.discs]
         if entry.disc not in discs:
-            raise self.faults.error('unbalances', index, 'disc',
-                                    problem=f'must be one of {", ".join(discs)}, got {entry.disc}')
+            raise self.faults.error('unbalances', index, 'disc', problem=(
+                f'must be one of {", ".join(discs)}, got {entry.disc}' if discs else
+                f'names a disc, of which there is none, got {entry.disc}'))
         return complex(self._moment(index, entry) * np.exp(1j * entry.phase))
 
     def _moment(self, index: int, entry: schema.UnbalanceEntry) -> float:

@@ -26,6 +26,7 @@ from rotorsoil_ros.case.quantities import (
     Radian,
     Ratio,
     Rpm,
+    Usual,
 )
 from rotorsoil_ros.machine.foundation import CONCRETE
 
@@ -33,6 +34,7 @@ from rotorsoil_ros.machine.foundation import CONCRETE
 class SoilEntry(Entry):
     """Half-space, by its shear modulus or by the velocity of its shear waves."""
 
+    ways = ('shear_modulus',), ('shear_wave_velocity',)
     shear_modulus: Pascal | None = None
     shear_wave_velocity: MetrePerSecond | None = None
     poisson_ratio: Ratio
@@ -91,6 +93,7 @@ class PartEntry(Entry):
 class FoundationEntry(Entry):
     """Block; its contact is a rectangle, a circle or a plan of several rectangles."""
 
+    ways = ('half_width', 'half_length'), ('radius',), ('parts',)
     name: Name
     half_width: Metre | None = None
     half_length: Metre | None = None
@@ -139,6 +142,8 @@ class Section(Entry):
 class DiscEntry(Entry):
     """Rigid disc, by its mass and inertias or by its dimensions."""
 
+    ways = (('mass', 'diametral_inertia', 'polar_inertia'),
+            ('outer_diameter', 'inner_diameter', 'width', 'density'))
     name: Name
     position: Metre
     mass: Kilogram | None = None
@@ -192,6 +197,7 @@ class GroundEntry(Entry):
 class UnbalanceEntry(Entry):
     """Unbalance on one disc: a moment, or what a balance grade permits, and a couple."""
 
+    ways = ('moment',), ('grade', 'rated_speed_rpm')
     disc: Name
     moment: KilogramMetre | None = None
     grade: BalanceGrade | None = None
@@ -224,6 +230,8 @@ class Uncertainty(Entry):
     ground_water: StrictBool | None = None
 
 
+Label: TypeAlias = Annotated[
+    str, StringConstraints(min_length=1, max_length=64), Usual('stand in')]
 Velocities: TypeAlias = tuple[MetrePerSecond, MetrePerSecond, MetrePerSecond]
 Displacements: TypeAlias = tuple[Metre, Metre, Metre]
 
@@ -231,8 +239,9 @@ Displacements: TypeAlias = tuple[Metre, Metre, Metre]
 class ZonesEntry(Entry):
     """Limits of housing velocity: those of a group of the standard, or one's own."""
 
+    ways = ('group',), ('label', 'rigid', 'flexible')
     group: Literal[1, 2] | None = None
-    label: Annotated[str, StringConstraints(min_length=1, max_length=64)] | None = None
+    label: Label | None = None
     rigid: Velocities | None = None
     flexible: Velocities | None = None
     rigid_displacement: Displacements | None = None

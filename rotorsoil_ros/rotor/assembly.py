@@ -43,10 +43,9 @@ class Rotor:
     def __post_init__(self) -> None:
         require(math.isfinite(self.shaft_height), 'shaft_height', 'finite, in m',
                 self.shaft_height)
+        require(len(self.shaft) > 0, 'shaft', 'one section or more', 0)
         places = {bearing.position for bearing in self.bearings}
-        if not self.shaft or len(places) < 2:
-            raise RotorSoilError('a rotor needs a shaft and bearings at two places or more, '
-                                 f'got {len(self.shaft)} sections, {len(places)} places')
+        require(len(places) >= 2, 'bearings', 'at two places or more', len(places))
         length = self.length
         for station in self.stations:
             if not -_SAME_NODE * length <= station.position <= length * (1.0 + _SAME_NODE):

@@ -135,8 +135,8 @@ def test_probe_is_a_channel():
     ('rotor.discs.1.position=5', 'rotor.discs.1.position: position of disc_2 must be on the '
                                  'shaft, 0 to 0.76202 m, got 5'),
     # what belongs together
-    ('rotor.bearings.1.foundation=blok', 'rotor.bearings.1.foundation: foundation of bearing_2 '
-                                         "must be one of ['block'], got blok"),
+    ('rotor.bearings.1.foundation=blok',
+     'rotor.bearings.1.foundation: must be one of block, got blok'),
     ('rotor.material=', 'rotor.material: is missing, and so is that of rotor.shaft.0'),
     ('foundations.0.radius=0.5',
      'foundations.0: needs either half_width and half_length, or parts, or radius, in m'),

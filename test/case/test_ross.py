@@ -145,7 +145,8 @@ def test_speed_range_may_be_chosen(tmp_path):
      'BearingElement_Bearing 0.frequency: is missing, in rad/s'),
     ('kxx = [ 10000000.0,]', 'kxx = [ true,]',
      'BearingElement_Bearing 0.kxx: must be finite numbers in N/m, got True'),
-    ('E = 211000000000.0', 'E = 0.0', 'ShaftElement_Shaft Element 0.material'),
+    ('E = 211000000000.0', 'E = 0.0',
+     'ShaftElement_Shaft Element 0.material.E: must be > 0 Pa, got 0'),
     ('[parameters]', '[parameters', 'is not TOML: '),
 ])
 def test_bad_file_is_one_line_and_status_2(tmp_path, capsys, old, new, problem):

@@ -276,7 +276,7 @@ def test_two_stations_of_one_name_are_refused():
 
 
 def test_shaft_on_one_bearing_falls():
-    with pytest.raises(RotorSoilError, match='bearings at two places or more'):
+    with pytest.raises(RotorSoilError, match='bearings must be at two places or more, got 1'):
         uniform_rotor(length=LENGTH, diameter=0.02, elements=2, material=STEEL,
                       bearings=[bearing('b', 0.0, stiffness=1e6, foundation=None),
                                 bearing('c', 0.0, stiffness=1e6, foundation=None)])

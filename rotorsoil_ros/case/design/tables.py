@@ -1,7 +1,7 @@
 """Which tables the ground of a case needs: solved, or out of the cache."""
 
 from rotorsoil_ros.case.cache import Cache, content_key
-from rotorsoil_ros.case.config import infinite_range, proportions
+from rotorsoil_ros.case.entries.ground import infinite_range, proportions
 from rotorsoil_ros.case.entries.site import site_reach
 from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel

@@ -7,6 +7,7 @@ from pydantic import Discriminator, Tag
 from rotorsoil_ros.case.entries.entry import AXES, CONSTANT, Entry, NUMBER, TABLE
 from rotorsoil_ros.case.quantities import (
     Celsius,
+    Clearance,
     Count,
     Degree,
     Kilogram,
@@ -108,10 +109,11 @@ def _thick(value: object) -> str:
 class JournalEntry(Entry):
     """Hydrodynamic bearing by its geometry and its oil."""
 
+    ways = ('viscosity',), ('oil',)
     type: Literal['plain', 'axial_groove', 'elliptic', 'tilting_pad']
     diameter: Metre
     length: Metre
-    radial_clearance: Metre
+    radial_clearance: Clearance
     viscosity: Annotated[
         Annotated[PascalSecond, Tag(NUMBER)] | Annotated[ViscosityTable, Tag(TABLE)],
         Discriminator(_thick)] | None = None
@@ -122,12 +124,13 @@ class JournalEntry(Entry):
     pads: Count | None = None
     pivot: Ratio | None = None
     load_on: Literal['pad', 'gap'] | None = None
-    least_film: Metre | None = None
+    least_film: Clearance | None = None
 
 
 class BearingEntry(Entry):
     """Bearing, by its coefficients or as a journal, and the block below it."""
 
+    ways = ('stiffness', 'damping'), ('journal',)
     name: Name
     position: Metre
     foundation: Name | None = None

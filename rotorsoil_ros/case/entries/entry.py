@@ -2,7 +2,8 @@
 
 from collections.abc import Hashable, Mapping
 import difflib
-from typing import Any, Self, TypeAlias
+import re
+from typing import Any, ClassVar, Self, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, model_validator, ValidationError
 from pydantic.functional_validators import ModelWrapValidatorHandler
@@ -36,6 +37,9 @@ class Entry(BaseModel):
     # The lowest pydantic that serves keeps names that begin with `model_` for itself.
     model_config = ConfigDict(extra='forbid', frozen=True, protected_namespaces=())
 
+    # Sets of keys of which a mapping needs one, and has no other beside it.
+    ways: ClassVar[tuple[tuple[str, ...], ...]] = ()
+
     @model_validator(mode='wrap')
     @classmethod
     def _refuse_unknown_keys(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
@@ -44,7 +48,7 @@ class Entry(BaseModel):
                    if isinstance(value, dict) else [])
         if not unknown:
             return handler(value)
-        meant = {key: _meant(key, cls, value) for key in unknown}
+        meant = {key: meant_key(key, cls, value) for key in unknown}
         faults = [InitErrorDetails(
             type=PydanticCustomError('unknown_key', '{problem}', {
                 'problem': _unknown(key, meant[key], list(cls.model_fields))}),
@@ -59,7 +63,7 @@ class Entry(BaseModel):
         raise ValidationError.from_exception_data(cls.__name__, faults)
 
 
-def _meant(key: Hashable, entry: type[Entry], value: Mapping[Hashable, Any]) -> str | None:
+def meant_key(key: Hashable, entry: type[Entry], value: Mapping[Hashable, Any]) -> str | None:
     """Return the key that a wrong one was probably meant to be, first one that is not there."""
     known = list(entry.model_fields)
     for choice in ([name for name in known if name not in value], known):
@@ -98,4 +102,7 @@ def _fault(detail: ErrorDetails) -> tuple[Place, str]:
     got = shown(detail['input'])
     if detail['type'] not in _WHAT:
         return place, f'{detail["msg"]}, got {got}'
-    return place, _WHAT[detail['type']].format(input=got, **context)
+    told = _WHAT[detail['type']].format(input=got, **context)
+    words = re.findall(r"'(\w+)'", context.get('expected', ''))
+    near = difflib.get_close_matches(str(detail['input']), words, n=1)
+    return place, f'{told}; did you mean {near[0]}?' if near else told

@@ -1,13 +1,16 @@
 """Which ground the entries of a case file describe, and which model of it can stand below."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 import math
 from typing import Any
 
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.case_errors import Faults
-from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
-from rotorsoil_ros.errors import require
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, HIGHEST_ORDER
+from rotorsoil_ros.errors import require, RotorSoilError
+from rotorsoil_ros.ground.half_space import a0_range
+from rotorsoil_ros.ground.layers.model import Proportions
 from rotorsoil_ros.ground.layers.profile import (
     Embedment,
     Layer,
@@ -16,10 +19,36 @@ from rotorsoil_ros.ground.layers.profile import (
     require_room,
     SURFACE,
 )
-from rotorsoil_ros.ground.soil import Soil
+from rotorsoil_ros.ground.soil import Contact, Soil
 
 # The only support that knows layers and walls in the ground.
 THIN_LAYERS = 'thin_layers'
+
+
+def infinite_range(
+    soil: Soil, contact: Contact, geometry: str, speed_range: tuple[float, float],
+) -> tuple[float, float]:
+    """Return the frequencies [rad/s] that infinite elements have to cover for some speeds."""
+    low, high = speed_range
+    # A disc is known down to rest; a strip has no static stiffness.
+    lowest = 0.0 if geometry == 'disc' else low
+    a0_range(soil, contact, geometry, omega_min=lowest, omega_max=high)
+    with suppress(RotorSoilError):  # at such speeds the running frequency has to do
+        a0_range(soil, contact, geometry, omega_min=lowest, omega_max=HIGHEST_ORDER * high)
+        return lowest, HIGHEST_ORDER * high
+    return lowest, high
+
+
+def proportions(
+    ground: LayeredSoil, contact: Contact, embedment: Embedment,
+    speed_range: tuple[float, float],
+) -> Proportions:
+    """Return what a table of layered ground has to cover for some speeds [rad/s]."""
+    high = speed_range[1]
+    found = Proportions.of(ground, contact, embedment, omega_max=high)
+    with suppress(RotorSoilError):  # at such speeds the running frequency has to do
+        return Proportions.of(ground, contact, embedment, omega_max=HIGHEST_ORDER * high)
+    return found
 
 
 @dataclass(frozen=True)

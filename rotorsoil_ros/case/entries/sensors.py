@@ -58,21 +58,29 @@ class Sensors:
         return self.others.get(channel, self.usual)
 
 
-def sensors_of(faults: Faults, channels: Sequence[str]) -> Sensors:
-    """Return what a document says of the accelerometers at channels, or raise an InputError."""
+def sensors_of(faults: Faults, channels: Sequence[str]) -> Sensors | None:
+    """Return what a document says of the accelerometers at channels, or None where it is wrong."""
     entry = faults.entries.sensors
     said = entry.model_dump(exclude={'channels'}, exclude_none=True)
     if faults.entries.anti_alias and 'anti_alias' not in said:
         said['anti_alias'] = True
-    others = {}
-    with faults.at('sensors', entry=entry):
-        usual = Pickup.of(PickupEntry(**said))
-    for name, own in entry.channels.items():
+
+    def usual() -> Pickup:
+        with faults.at('sensors', entry=entry):
+            return Pickup.of(PickupEntry(**said))
+
+    def other(_: int, name: str) -> Pickup:
         if name not in channels:
             near = difflib.get_close_matches(name, channels, n=1)
             raise faults.error('sensors', 'channels', name, problem=(
                 'is not a channel of this machine' + (
                     f'; did you mean {near[0]}?' if near else '')))
+        own = entry.channels[name]
         with faults.at('sensors', 'channels', name, entry=own):
-            others[name] = Pickup.of(PickupEntry(**said | own.model_dump(exclude_none=True)))
-    return Sensors(usual, others)
+            return Pickup.of(PickupEntry(**said | own.model_dump(exclude_none=True)))
+
+    found = faults.attempt(usual)
+    others = faults.attempt_each(other, entry.channels)
+    if found is None or others is None:
+        return None
+    return Sensors(found, dict(zip(entry.channels, others, strict=True)))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 BOUNDARY_ELEMENTS = 'boundary_elements'
 
 # Natural modes above the running speed and excitation at twice the speed need the soil too.
-_HIGHEST_ORDER = 2.0
+HIGHEST_ORDER = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ def site_reach(site: Site, soil: Soil, speed_range: tuple[float, float]) -> floa
     scaled, scale = site.scaled(), site.length / soil.shear_wave_speed
     running = highest_a0(scaled, scale * speed_range[1])
     with suppress(RotorSoilError):  # at such speeds the running frequency has to do
-        return highest_a0(scaled, scale * _HIGHEST_ORDER * speed_range[1])
+        return highest_a0(scaled, scale * HIGHEST_ORDER * speed_range[1])
     return running
 
 
