@@ -32,10 +32,11 @@ class BlockEntries:
 
     @property
     def _is_undecided(self) -> bool:
-        """Whether a bearing does not say on which of several blocks it stands."""
+        """Whether a bearing does not say on which of the blocks it stands."""
         entries = self.faults.entries
-        return len(entries.foundations) > 1 and any(
-            bearing.foundation is None for bearing in entries.rotor.bearings)
+        names = [block.name for block in entries.foundations]
+        known = names if len(names) > 1 else [*names, None]
+        return any(bearing.foundation not in known for bearing in entries.rotor.bearings)
 
     def _seats(self, entry: schema.FoundationEntry) -> list[float]:
         """Return where the bearings of a block stand along the shaft [m]."""

@@ -111,7 +111,7 @@ def test_probe_is_a_channel():
     ('rotor.discs=3', 'rotor.discs: must be a list, got 3'),
     ('support.model=cones',
      "support.model: must be 'rigid', 'cone', 'infinite_elements', 'boundary_elements', "
-     "'thin_layers' or 'table', got 'cones'"),
+     "'thin_layers' or 'table', got 'cones'; did you mean cone?"),
     ('foundations.0.inertia=[1, 2]', 'foundations.0.inertia.2: is missing'),
     ('foundations.0.inertia=[1, 2, 3, 4]',
      'foundations.0.inertia: has more entries than it should: [1, 2, 3, 4]'),
@@ -142,7 +142,7 @@ def test_probe_is_a_channel():
      'foundations.0: needs either half_width and half_length, or parts, or radius, in m'),
     ('foundations.0.half_length=',
      'foundations.0: needs either half_width and half_length, or parts, or radius, in m'),
-    ('foundations.0.name=other', 'foundations.0: no bearing stands on other'),
+    ('foundations.0.name=other', 'rotor.bearings.0.foundation: must be one of other, got block'),
     ('foundations=[]', 'foundations: is missing; the support model cone needs a block'),
     ('soil=', 'soil: is missing; the support model cone needs it'),
     ('support.geometry=plane_strain',
@@ -169,7 +169,7 @@ def test_bearing_between_several_foundations_has_to_choose():
     text = ('[{name: a, radius: 1, mass: 1, centre_of_gravity_height: 0, inertia: [1, 1, 1]},'
             ' {name: b, radius: 1, mass: 1, centre_of_gravity_height: 0, inertia: [1, 1, 1]}]')
     with pytest.raises(InputError, match=r'rotor.bearings.0.foundation: is missing; there are '
-                                         r'several: a, b$'):
+                                         r'several: a, b\n'):
         load(PAPER, [f'foundations={text}', 'rotor.bearings.0.foundation='])
 
 

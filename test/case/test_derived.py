@@ -144,6 +144,7 @@ def test_all_wrong_values_are_told_at_once():
         'speed_range_rpm: must be two rising speeds >= 0 rpm, got [5, 4]',
         'rotor.shaft.0.length: must be > 0 m and finite, got 0',
         'rotor.discs.1.mass: must be >= 0 kg and finite, got -3',
+        'rotor.bearings.0.foundation: must be one of block, got other',
         'foundations.0.mass: must be >= 0 kg and finite, got -2',
         'unbalances.0.disc: must be one of coupling, wheel, got wheell']
 

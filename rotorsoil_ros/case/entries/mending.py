@@ -124,11 +124,11 @@ class _Mended:
         owner = entry_kind(kind_at(self._schema, self._content, place[:-1]), parent)
         if owner is None or place[-1] not in owner.model_fields:
             return self._rename_or_drop(parent, place, owner)
-        if any(place[-1] in way for way in owner.ways) and (
-                changed := self._whole(place[:-1], owner, parent, attempt=0)):
+        in_a_way = any(place[-1] in way for way in owner.ways)
+        if in_a_way and (changed := self._whole(place[:-1], owner, parent, attempt=0)):
             return changed
         field = owner.model_fields[str(place[-1])]
-        if may_go and place[-1] in parent and not field.is_required():
+        if may_go and not in_a_way and place[-1] in parent and not field.is_required():
             del parent[place[-1]]
             return {place}
         return self._put(parent, place, attempt)

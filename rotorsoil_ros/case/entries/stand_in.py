@@ -126,7 +126,7 @@ class StandIns:
         if origin is Literal:
             return self._one_of(parts, place, attempt)
         if origin in (tuple, list):
-            count = len(parts) if origin is tuple else 2
+            count = len(parts) if origin is tuple else 1 + (self._draw + attempt) % 2
             return _rising([self.of(parts[min(index, len(parts) - 1)], place,
                                     attempt=attempt + index) for index in range(count)])
         if isinstance(choice, type) and issubclass(choice, Entry):
