@@ -42,7 +42,7 @@ GROUNDS: dict[str, tuple[list[tuple[float, tuple[float, ...]]], tuple[float, ...
 STEPS = {'eigenproblems of the waves': ('waves', 'WavePencil.standing'),
          'ground outside': ('cylinder', 'CylinderInWaves.around'),
          'ground below': ('cylinder', 'CylinderInWaves.beneath'),
-         'rational fits': ('tabulate', 'interpolant'),
+         'rational fits': ('joining', 'interpolant'),
          'singular frequencies': ('tabulate', 'singular_frequencies')}
 HIGHEST, UNSEEN = 6.0, 12
 RATIOS = (3.0, 5.0, 10.0, 20.0)
@@ -69,13 +69,13 @@ def main() -> None:
 
 def measure(name: str) -> None:
     """Print what one table costs."""
-    from rotorsoil_ros.ground.layers import cylinder, tabulate, waves
+    from rotorsoil_ros.ground.layers import cylinder, joining, tabulate, waves
     from rotorsoil_ros.ground.layers.line import LineMesh
     from rotorsoil_ros.ground.layers.profile import Embedment
     from rotorsoil_ros.ground.layers.table import entry_scale
 
     spent: dict[str, float] = defaultdict(float)
-    rooms = {'waves': waves, 'cylinder': cylinder, 'tabulate': tabulate}
+    rooms = {'waves': waves, 'cylinder': cylinder, 'joining': joining, 'tabulate': tabulate}
     for step, (room, place) in STEPS.items():
         clock(rooms[room], place, step, spent)
     ground, depth = ground_of(name)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
     from rotorsoil_ros.events import Profile
+    from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
     from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
     from rotorsoil_ros.ground.boundary.site import Site
     from rotorsoil_ros.ground.cone import ConeModel
@@ -71,9 +72,9 @@ __all__ = [
     'Comparison', 'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DampingSplit',
     'DampingSplitter', 'DesignReport', 'Disc', 'Embedment', 'Foundation', 'ImportedTable',
     'InfiniteElementModel', 'InputError', 'JournalBearing', 'JournalStates', 'Layer',
-    'LayeredSoil', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'Oil', 'OutOfTableError',
-    'Part', 'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Record',
-    'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
+    'LayeredSiteModel', 'LayeredSoil', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'Oil',
+    'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile',
+    'Record', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
     'ShaftSection', 'Site', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource', 'Study',
     'ThinLayerModel', 'Transmissibility', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
     'import_table', 'load', 'predict_many', 'read_profile', 'study',
@@ -93,6 +94,7 @@ _ROOMS = {
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
     'events': ('Profile',),
+    'ground.boundary.layered_model': ('LayeredSiteModel',),
     'ground.boundary.model': ('BoundaryElementModel',),
     'ground.boundary.site': ('Site',),
     'ground.cone': ('ConeModel',),

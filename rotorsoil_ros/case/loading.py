@@ -10,7 +10,7 @@ from rotorsoil_ros.case import cache, config, models
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.design import tables
 from rotorsoil_ros.case.entries.ground import infinite_range, proportions, THIN_LAYERS
-from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of, site_reach
+from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, layered_site, site_of, site_reach
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.half_space import a0_range
@@ -54,6 +54,8 @@ def soil_keys(case: config.Case) -> list[str]:
             for block, embedment in zip(case.foundations, case.embedments, strict=True)]
     if case.support.model == BOUNDARY_ELEMENTS and soil is not None:
         site = site_of(case.foundations, case.ground_probes)
+        if case.ground is not None:
+            return [tables.layered_site_key(layered_site(case.ground, site, case.speed_range))]
         return [tables.site_key(site.scaled(), soil.poisson_ratio, soil.loss_factor,
                                 site_reach(site, soil, case.speed_range))]
     if case.support.model != 'infinite_elements' or soil is None:

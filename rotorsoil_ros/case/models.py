@@ -1,9 +1,7 @@
 """The models that a case stands for, with their tables out of the cache."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import lru_cache
 from itertools import islice
 import math
 from pathlib import Path
@@ -15,27 +13,25 @@ from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.ground import band_contents
+from rotorsoil_ros.case.design.shapes import other_forms
 from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
     infinite_element_model,
     key_of,
+    layered_site_model,
     thin_layer_model,
 )
-from rotorsoil_ros.case.entries.ground import proportions, THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.summary import stability_doubts, unstable
-from rotorsoil_ros.errors import InputError, RotorSoilError, solved
-from rotorsoil_ros.ground.accuracy import shape_error, ShapeError
+from rotorsoil_ros.errors import InputError, solved
+from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
-from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
+from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, ThinLayerModel
 from rotorsoil_ros.ground.layers.profile import LayeredSoil, LEAST_LOSS_FACTOR
-from rotorsoil_ros.ground.layers.table import LayeredTable
 from rotorsoil_ros.ground.neighbours import on_soil
-from rotorsoil_ros.ground.soil import Circle, Contact, RigidSoil, Soil, SoilModel
+from rotorsoil_ros.ground.soil import RigidSoil, Soil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.band import (
     depends_on_soil,
@@ -56,15 +52,6 @@ UNITS = {
     'phase': 'rad',
     'convention': 'x(t) = Re(X exp(+i omega t))',
 }
-
-# Frequencies at which a model is compared with what knows its shape, and the lowest of them over
-# the highest where a machine starts from rest.
-_COMPARED = 60
-_LOWEST_SHARE = 0.02
-
-# Shapes on layers are taken to be stiffer than their discs by no more than this, and by this where
-# nobody knows.
-_MOST_STIFFER = 0.5
 
 
 def coupled_model(case: Case, directory: Path) -> CoupledModel:
@@ -94,6 +81,9 @@ def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:
     """Return the model under each foundation, or one under all of them, as `coupled_model`."""
     if case.support.model == BOUNDARY_ELEMENTS and case.soil is not None:
         site = site_of(case.foundations, case.ground_probes)
+        if case.ground is not None:
+            return (layered_site_model(case.ground, site, cache=Cache(directory),
+                                       speed_range=case.speed_range),)
         return (boundary_element_model(case.soil, site, cache=Cache(directory),
                                        speed_range=case.speed_range),)
     return tuple(_soil_model(case, index, Cache(directory))
@@ -117,45 +107,6 @@ def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
                                   speed_range=case.speed_range)
 
 
-def shape_errors(
-    case: Case, soil_models: Sequence[SoilModel], directory: Path,
-) -> tuple[ShapeError | None, ...]:
-    """
-    Return how far discs and cones are from the shape of each block over the speed range.
-
-    Against boundary elements of that block alone; a circle on cones against infinite elements.
-    On layers, discs and block are compared on a half-space of the soil below the base. None where
-    the model is exact, or the shape is beyond reach.
-    """
-    support, soil = case.support, case.soil
-    if (soil is None or support.geometry != 'disc'
-            or support.model not in ('cone', 'infinite_elements', THIN_LAYERS)):
-        return (None,) * len(case.foundations)
-    cache, low, high = Cache(directory), *case.speed_range
-    omega = np.linspace(max(low, _LOWEST_SHARE * high), high, _COMPARED)
-
-    def error(contact: Contact, model: SoilModel, alone: Site | None) -> ShapeError | None:
-        is_round = alone is None
-        if is_round and support.model != 'cone':
-            return None
-        with suppress(RotorSoilError):
-            disc: SoilModel = model
-            if is_round or support.model == THIN_LAYERS:
-                require_kind('disc', soil.poisson_ratio, soil.loss_factor)
-                disc = infinite_element_model(soil, contact, 'disc', cache=cache,
-                                              speed_range=case.speed_range)
-            if alone is None:
-                return shape_error(model, disc, omega)
-            return shape_error(disc, boundary_element_model(
-                soil, alone, cache=cache, speed_range=case.speed_range), omega)
-        return None
-
-    return tuple(
-        error(block.contact, model,
-              None if isinstance(block.contact, Circle) else site_of([block]))
-        for block, model in zip(case.foundations, soil_models, strict=True))
-
-
 def response_key(case: Case, model: CoupledModel) -> str:
     """Return what identifies the response table of a case: all of it but its unbalance."""
     return content_key('response', 2, TOLERANCE, model.rotor, model.foundations,
@@ -171,6 +122,8 @@ def _identity(model: SoilModel) -> object:
                 float(model.table.edges[-1])]
     if isinstance(model, BoundaryElementModel):
         return ['boundary', model.soil, model.site, key_of(model)]
+    if isinstance(model, LayeredSiteModel):
+        return ['site on layers', model.ground, model.site, key_of(model)]
     if isinstance(model, ComplianceTable):
         return ['table', model.omega, model.values, *model.cut_offs]
     return model
@@ -232,11 +185,13 @@ def response_band(
     with_soil = case.soil is not None and depends_on_soil(model)
     if not with_soil and not spread.inputs(with_soil=False):
         return None
-    if case.soil is not None and case.support.model == BOUNDARY_ELEMENTS:
+    if (case.soil is not None and case.ground is None
+            and case.support.model == BOUNDARY_ELEMENTS):
         model = replace(model, soil_models=(boundary_element_model(
             case.soil, site_of(case.foundations, case.ground_probes), cache=Cache(directory),
             speed_range=case.speed_range, spread=spread.poisson_ratio),))
-    elements, stiffer = _other_forms(case, spread, directory)
+    elements, stiffer = other_forms(
+        case, soil_models(case, directory), spread, directory)
     forms = _forms(spread.places(with_soil=with_soil), with_elements=bool(elements),
                    with_stiffer=any(stiffer))
     others = []
@@ -259,34 +214,27 @@ def machine_at(
         return machine
     layered = case.ground is not None
     if spread.changes_ground(place, layered=layered) and case.support.geometry == 'disc':
-        machine = replace(machine, soil_models=tuple(
-            _other_ground(case, index, spread, place, cache)
-            for index in range(len(machine.foundations))))
+        machine = replace(machine, soil_models=_other_grounds(case, spread, place, cache))
     return on_soils(machine, [_soil_at(case.soil, model, spread, place)])[0]
 
 
-def _other_ground(
-    case: Case, index: int, spread: SoilSpread, place: Place, cache: Cache | None,
-) -> SoilModel:
-    """Return what a block stands on at a place where the ground itself is another."""
+def _other_grounds(
+    case: Case, spread: SoilSpread, place: Place, cache: Cache | None,
+) -> tuple[SoilModel, ...]:
+    """Return what blocks stand on at a place where the ground itself is another."""
     assert case.soil is not None
     lossy = replace(case.soil, loss_factor=max(case.soil.loss_factor, LEAST_LOSS_FACTOR))
-    ground, embedment = spread.ground(case.ground or LayeredSoil((), lossy),
-                                      case.embedments[index], place)
-    contact, (low, high) = case.foundations[index].contact, case.speed_range
+    low, high = case.speed_range
     # Softer soil has shorter waves: its table has to reach further.
-    reach = max(1.0, 0.5 * spread.shear_modulus_factor**0.5)
-    if cache is not None:
-        return thin_layer_model(ground, contact, embedment, cache=cache,
-                                speed_range=(low, reach * high))
-    scaled = proportions(ground, contact, embedment, (low, reach * high))
-    return ThinLayerModel(ground, contact, _solved_once(scaled), embedment)
-
-
-@lru_cache(maxsize=64)
-def _solved_once(scaled: Proportions) -> LayeredTable:
-    """Return the table of a ground that is looked at more than once, as an input by itself."""
-    return scaled.table()
+    speeds = low, max(1.0, 0.5 * spread.shear_modulus_factor**0.5) * high
+    grounds = [spread.ground(case.ground or LayeredSoil((), lossy), own, place)
+               for own in case.embedments]
+    if case.support.model == BOUNDARY_ELEMENTS:
+        return (layered_site_model(grounds[0][0], site_of(case.foundations, case.ground_probes),
+                                   cache=cache, speed_range=speeds),)
+    return tuple(thin_layer_model(ground, block.contact, embedment, cache=cache,
+                                  speed_range=speeds)
+                 for block, (ground, embedment) in zip(case.foundations, grounds, strict=True))
 
 
 def _soil_at(soil: Soil, model: CoupledModel, spread: SoilSpread, place: Place) -> Soil:
@@ -308,38 +256,6 @@ def _forms(
                 for number, place in enumerate(places[1 + len(alone):]))
 
 
-def _other_forms(
-    case: Case, spread: SoilSpread, directory: Path,
-) -> tuple[list[SoilModel], list[float]]:
-    """Return what the ground below each block may be instead, and how much stiffer."""
-    stiffer = [0.0] * len(case.foundations)
-    if (not spread.model_form or case.soil is None or case.support.geometry != 'disc'
-            or case.support.model not in ('cone', 'infinite_elements', THIN_LAYERS)):
-        return [], stiffer
-    if case.support.model == THIN_LAYERS:
-        # On layers only discs are known: a half-space tells how much stiffer a shape is.
-        shapes = shape_errors(case, [RigidSoil()] * len(stiffer), directory)
-        return [], [0.0 if isinstance(block.contact, Circle) else
-                    min(_MOST_STIFFER if shape is None else shape.share, _MOST_STIFFER)
-                    for block, shape in zip(case.foundations, shapes, strict=True)]
-    low, high = case.speed_range
-    # A softer soil has shorter waves: its table has to reach further.
-    speeds = low, max(1.0, 0.5 * spread.shear_modulus_factor**0.5) * high
-    cache = Cache(directory)
-    # Beyond the reach of either there is no other form: `band_contents` says so.
-    with suppress(RotorSoilError):
-        if not any(isinstance(block.contact, Circle) for block in case.foundations):
-            return [boundary_element_model(
-                case.soil, site_of(case.foundations), cache=cache, speed_range=speeds,
-                spread=spread.poisson_ratio)], stiffer
-        if case.support.model == 'cone':
-            require_kind('disc', case.soil.poisson_ratio, case.soil.loss_factor)
-            return [infinite_element_model(case.soil, block.contact, 'disc', cache=cache,
-                                           speed_range=speeds)
-                    for block in case.foundations], stiffer
-    return [], stiffer
-
-
 def blocks_on_each(model: CoupledModel) -> list[str]:
     """Return which block stands on each model of the soil, or which blocks on the only one."""
     names = [block.name for block in model.foundations]
@@ -353,7 +269,7 @@ def description(
     stable = table.stability
     compliances = {f'compliance of {names}': key_of(soil) for names, soil in zip(
         blocks_on_each(model), model.soil_models, strict=True)
-        if isinstance(soil, (BoundaryElementModel, InfiniteElementModel))}
+        if isinstance(soil, (BoundaryElementModel, InfiniteElementModel, LayeredSiteModel))}
     return {
         'machine': name, 'case': case.name, 'version': rotorsoil_ros.__version__,
         'support': case.support.model, 'tables': {'response': table.key, **compliances},

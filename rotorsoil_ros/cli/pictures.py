@@ -30,6 +30,7 @@ from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
 from rotorsoil_ros.figures.transmissibility import transmissibility_figure
+from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
@@ -100,6 +101,9 @@ def _soil_figures(
         if isinstance(own, ThinLayerModel):
             yield f'compliance_{block.name}', _layers_figure(case, block, own, directory)
             continue
+        if case.ground is not None:
+            yield f'compliance_{block.name}', _site_figure(case, model, index, directory)
+            continue
         known: dict[str, SoilModel] = {'cone': ConeModel(case.soil, block.contact)}
         spans = []
         for label, solved in (('infinite elements', _infinite), ('boundary elements', _boundary)):
@@ -129,6 +133,24 @@ def _layers_figure(
     return compliance_figure(
         case.name, block, case.soil,
         {'on the surface, no layers': even, 'as given': layers}, omega)
+
+
+def _site_figure(
+    case: Case, model: CoupledModel, index: int, directory: Path,
+) -> 'Figure':
+    """Return the compliance of a block on layers beside that of the disc that stands for it."""
+    assert case.soil is not None
+    assert case.ground is not None
+    block, ground = model.foundations[index], model.soil_models[0]
+    disc = thin_layer_model(case.ground, block.contact, SURFACE, cache=cache.Cache(directory),
+                            speed_range=case.speed_range)
+    highest = disc.omega_range[1]
+    if isinstance(ground, LayeredSiteModel):
+        highest = min(highest, ground.omega_range[1])
+    return compliance_figure(
+        case.name, block, case.soil,
+        {'disc of thin layers': disc, 'boundary elements': model.support.soils[index]},
+        np.linspace(0.0, highest, _POINTS))
 
 
 def _infinite(

@@ -14,6 +14,7 @@ from rotorsoil_ros.case.design.depth import depth_remarks
 from rotorsoil_ros.case.design.ground import model_error
 from rotorsoil_ros.case.design.report import Acceptance
 from rotorsoil_ros.case.design.rigidity import of_rigidity
+from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.design.tables import key_of
 from rotorsoil_ros.case.journal_entries import BEYOND
 from rotorsoil_ros.case.summary import (
@@ -30,6 +31,7 @@ from rotorsoil_ros.cli.arguments.options import SI
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.boundary.table import BoundaryTable
 from rotorsoil_ros.ground.elements.table import DimensionlessTable
@@ -65,7 +67,7 @@ def check(arguments: Namespace) -> int:
         if case.journals:
             doubts += near_threshold(case, stability(
                 model, (case.speed_range[0], BEYOND * case.speed_range[1])))
-    shapes = models.shape_errors(case, model.support.soils, directory)
+    shapes = shape_errors(case, model.support.soils, directory)
     _print_table(derived_quantities(case, model.soil_models, shapes))
     _print_table(_stability(table.stability, units))
     _print_table(criticals)
@@ -121,7 +123,7 @@ def tabulate(arguments: Namespace) -> int:
     if model.foundations:
         print(f'{"soil ready in":40s} {soil_seconds:.3g} s')
     errors = [(block, model_error(case, block, shape)) for block, shape in zip(
-        case.foundations, models.shape_errors(case, model.support.soils, directory),
+        case.foundations, shape_errors(case, model.support.soils, directory),
         strict=True)]
     low, high = table.speed_range
     _print_table([
@@ -145,6 +147,9 @@ def _compliance(block: str, soil: SoilModel, directory: Path) -> Iterable[tuple[
     if isinstance(soil, BoundaryElementModel):
         yield from _boundary(block, soil, directory)
         return
+    if isinstance(soil, LayeredSiteModel):
+        yield from _on_layers(block, soil, directory)
+        return
     if not isinstance(soil, InfiniteElementModel):
         yield f'{block}: compliance', f'closed form, {type(soil).__name__}'
         return
@@ -166,6 +171,19 @@ def _boundary(
     yield f'{blocks}: covers', (f'a0 0 to {table.a0_max:g}, here 0 to '
                                 f'{rad_s_to_hz(soil.omega_range[1]):.4g} Hz')
     yield from _solved(blocks, table, soil, directory)
+
+
+def _on_layers(
+    blocks: str, soil: LayeredSiteModel, directory: Path,
+) -> Iterable[tuple[str, str]]:
+    table = soil.table.functions
+    yield f'{blocks}: compliance', f'boundary elements on layers, {len(table.pieces)} pieces'
+    yield f'{blocks}: covers', (f'a0 0 to {soil.a0_max:g} of the uppermost layer, here 0 to '
+                                f'{rad_s_to_hz(soil.omega_range[1]):.4g} Hz')
+    yield f'{blocks}: solves', f'{table.solves}, {table.nodes} nodes over the depth'
+    yield (f'{blocks}: largest error of the solver',
+           f'{table.measured_error:.2g}, at unseen frequencies')
+    yield f'{blocks}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
 
 
 def _solved(

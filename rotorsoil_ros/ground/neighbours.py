@@ -6,6 +6,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
@@ -72,6 +73,10 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
             table = replace(table, loss_factor=soil.loss_factor)
             return NeighbourSoil(InfiniteElementModel(as_solved, contact, table),
                                  soil.poisson_ratio)
+        case LayeredSiteModel():
+            own = model.material
+            return model.scaled(modulus=soil.shear_modulus / own.shear_modulus,
+                                density=soil.density / own.density)
         case ThinLayerModel():
             own = model.ground.at(model.embedment.depth)
             return model.scaled(modulus=soil.shear_modulus / own.shear_modulus,

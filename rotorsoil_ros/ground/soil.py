@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Protocol, runtime_checkable, TypeAlias
+from typing import Protocol, runtime_checkable, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -204,12 +204,25 @@ class SharedGround(Protocol):
         ...
 
 
+Ground = TypeVar('Ground', bound=SoilModel)
+
+
 @dataclass(frozen=True, slots=True)
 class OneOfBlocks:
     """What one of several blocks stands on, the others lying on the ground without loads."""
 
     ground: SharedGround
     index: int
+
+    @property
+    def singular(self) -> FloatArray:
+        """Where a wave of the layers begins to travel, rising [rad/s]."""
+        return singular_of(self.ground)
+
+    @property
+    def second_opinion(self) -> 'OneOfBlocks':
+        """The same block on a poorer model of the ground."""
+        return OneOfBlocks(second_opinion_of(self.ground), self.index)
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of the massless contact, (n, 6, 6) over (x, y, z, rx, ry, rz)."""
@@ -235,7 +248,7 @@ def below_each(models: Sequence[SoilModel], blocks: int) -> tuple[SoilModel, ...
     return tuple(models)
 
 
-def singular_of(model: SoilModel) -> FloatArray:
+def singular_of(model: SoilModel | SharedGround) -> FloatArray:
     """
     Return at which frequencies the compliance of a model has a branch point, rising [rad/s].
 
@@ -246,14 +259,14 @@ def singular_of(model: SoilModel) -> FloatArray:
     return found
 
 
-def second_opinion_of(model: SoilModel) -> SoilModel:
+def second_opinion_of(model: Ground) -> Ground:
     """
     Return a poorer model of the same ground, or the model itself if there is none.
 
     What both say of real frequencies is nearly the same; what they say of vibrations that decay
     differs where the solves do not determine it.
     """
-    found: SoilModel = getattr(model, 'second_opinion', model)
+    found: Ground = getattr(model, 'second_opinion', model)
     return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.accuracy import StifferGround
+from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
@@ -239,7 +240,7 @@ def _response(predictor: Predictor, speed: FloatArray) -> ComplexArray:
 def depends_on_soil(model: CoupledModel) -> bool:
     """Return whether a machine stands on a soil that its model knows."""
     return any(isinstance(soil, (BoundaryElementModel, ConeModel, InfiniteElementModel,
-                                 ThinLayerModel))
+                                 LayeredSiteModel, ThinLayerModel))
                for soil in model.soil_models)
 
 

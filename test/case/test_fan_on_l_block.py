@@ -9,12 +9,12 @@ import pytest
 import rotorsoil_ros as rs
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.design.ground import model_error, of_neighbours
+from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.loading import soil_keys
 from rotorsoil_ros.case.models import (
     coupled_model,
     response_band,
     response_table,
-    shape_errors,
 )
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
@@ -175,9 +175,6 @@ def test_blocks_on_one_ground_are_not_called_alone():
     (['support.model=cone', 'rotor.bearings.0.foundation=next_block'],
      'ground.probes: need the support model boundary_elements, which alone tells the motion of '
      'the ground beside the blocks, got cone'),
-    (['uncertainty.rock_depth=[2.0, 8.0]'],
-     'ground.probes: tell the motion of a half-space only, got uncertainty.rock_depth too, which '
-     'puts rock below it'),
     (['soil.poisson_ratio=0.495'],
      'soil.poisson_ratio: must be <= 0.49 for boundary elements, got 0.495'),
     (['foundations.0.parts.1.half_width=0.02', 'foundations.0.parts.1.centre=[-1.02, -0.75]',

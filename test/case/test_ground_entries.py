@@ -1,5 +1,6 @@
 """Layers, rock and embedment in a case: what it stands for, what it tells, and what is refused."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -7,12 +8,17 @@ import pytest
 import yaml
 
 import rotorsoil_ros as rs
+from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.design.depth import depth_remarks
+from rotorsoil_ros.case.design.ground import model_error
 from rotorsoil_ros.case.design.influence import influences, velocity
+from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.models import machine_at
 from rotorsoil_ros.case.summary import derived_quantities, warnings
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.spread import SoilSpread
 
@@ -21,6 +27,7 @@ SAND = {'shear_modulus': 100e6, 'poisson_ratio': 0.3, 'density': 1900.0, 'loss_f
 LAYER = {**SAND, 'thickness': 1.5}
 ROCK = {'layers': [LAYER], 'below': 'rock'}
 THIN = {'model': 'thin_layers'}
+BY_SHAPE = {'model': 'boundary_elements'}
 
 
 @pytest.fixture
@@ -71,6 +78,43 @@ def test_case_tells_its_layers(fan):
     assert 'thin layers under a disc' in told['block: model error']
 
 
+def test_block_on_layers_by_its_shape_is_stiffer_than_its_discs_by_what_check_says(fan, cache):
+    thin, by_shape = (fan(soil=ROCK, support=support) for support in (THIN, BY_SHAPE))
+    model = thin.model
+    [shape] = shape_errors(thin.case, model.support.soils, cache)
+    told = model_error(thin.case, thin.case.foundations[0], shape)
+    assert told.endswith('against boundary elements')
+    assert 'half-space' not in told
+    omega = np.array([shape.omega])
+    dof = DOFS.index(shape.dof)
+    one, other = (machine.model.support.soils[0].compliance(omega)[0, dof, dof]
+                  for machine in (thin, by_shape))
+    assert abs(one / other - 1.0) == pytest.approx(shape.share, rel=1e-2)
+    assert 0.05 < shape.share < 0.2
+    assert 'on these layers: within 0.5%' in dict(
+        derived_quantities(by_shape.case, by_shape.model.soil_models))['block: model error']
+    # Light modes below the cut-off of the layer, by pieces as on discs.
+    speeds = [[one.speed for one in machine.critical_speeds()] for machine in (thin, by_shape)]
+    assert len(speeds[0]) == len(speeds[1]) == 2
+    assert all(1.0 < shaped / round_ < 1.05 for round_, shaped in zip(*speeds, strict=True))
+
+
+def test_softer_layers_and_other_rock_are_solved_for_the_shape_too(fan, cache):
+    machine = fan(soil=ROCK, support=BY_SHAPE)
+    spread = SoilSpread(rock_depth=(1.5, 6.0))
+    shallow, deep = (machine_at(machine.case, machine.model, spread, {'rock_depth': end},
+                                Cache(cache)).soil_models[0] for end in (-1.0, 1.0))
+    assert isinstance(deep, rs.LayeredSiteModel)
+    omega = np.array([100.0])
+    np.testing.assert_allclose(shallow.compliance(omega),
+                               machine.model.soil_models[0].compliance(omega), rtol=1e-9)
+    assert deep.singular[0] == pytest.approx(shallow.singular[0] / 4.0, rel=1e-3)
+    softer = on_soil(deep, replace(machine.case.soil, shear_modulus=25e6),
+                     machine.case.foundations[0].contact)
+    np.testing.assert_allclose(softer.compliance(0.5 * omega), 4.0 * deep.compliance(omega),
+                               rtol=1e-9)
+
+
 def test_case_tells_where_waves_begin(fan):
     machine = fan(soil=ROCK, support=THIN)
     told = dict(derived_quantities(machine.case, machine.model.soil_models))
@@ -107,9 +151,14 @@ def test_buried_block_is_asked_about(fan):
       'soil.below.shear_modulus: must be > 0 Pa']),
     ({'soil': {**SAND, 'loss_factor': 0.0}}, ['soil.loss_factor: must be >= 0.005']),
     ({'soil': ROCK, 'support': {'model': 'cone'}},
-     ['support.model: must be thin_layers on soil.layers, got cone']),
+     ['support.model: must be thin_layers or boundary_elements on soil.layers, got cone']),
     ({'soil': ROCK, 'support': {'model': 'infinite_elements'}},
-     ['support.model: must be thin_layers on soil.layers, got infinite_elements']),
+     ['support.model: must be thin_layers or boundary_elements on soil.layers, got '
+      'infinite_elements']),
+    ({'soil': {**ROCK, 'layers': [{**LAYER, 'thickness': 0.08}]}, 'support': BY_SHAPE},
+     ['soil: thickness must be >= 0.1 m, 0.1 of the shortest half side']),
+    ({'soil': ROCK, 'support': BY_SHAPE, 'block': {'embedment': 0.5}},
+     ['foundations.0.embedment: belongs to the support model thin_layers, got 0.5']),
     ({'support': {**THIN, 'geometry': 'plane_strain'}}, ['support.geometry: must be disc']),
     ({'soil': ROCK, 'block': {'embedment': 1.5}},
      ['foundations.0.embedment: must be < 1.5 m, where the rock begins, got 1.5']),

@@ -11,7 +11,7 @@ from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.ground.accuracy import CONE_ERROR, gap, neglected_coupling, ShapeError
 from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
-from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.boundary.model import SiteGround
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.plan import Plan
 from rotorsoil_ros.ground.soil import Circle, Contact, extents, SoilModel
@@ -67,7 +67,8 @@ def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) ->
     support, contact = case.support.model, foundation.contact
     if support == BOUNDARY_ELEMENTS:
         alone = len(case.foundations) == 1 and not isinstance(contact, Plan)
-        return f'boundary elements of this plan: within {0.5 if alone else 1.0:g}%'
+        where = '' if case.ground is None else ' on these layers'
+        return f'boundary elements of this plan{where}: within {0.5 if alone else 1.0:g}%'
     if support not in _BY_DISCS or case.support.geometry != 'disc':
         return ''
     parts = ['thin layers under a disc: within 0.1%'] if support == THIN_LAYERS else []
@@ -80,12 +81,18 @@ def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) ->
                 'not known, where boundary elements do not reach')
             parts.append(f'{what}: {known}')
         else:
-            where = ' on a half-space of the soil below it' if support == THIN_LAYERS else ''
+            where = ' on a half-space of the soil below it' if _is_embedded(
+                case, foundation) else ''
             parts.append(
                 f'{what}{where}: compliance off by up to {shape.share:.0%} over the speed range '
                 f'({shape.dof} at {rad_s_to_hz(shape.omega):.3g} Hz), against '
                 f'{"infinite" if isinstance(contact, Circle) else "boundary"} elements')
     return '; '.join(parts)
+
+
+def _is_embedded(case: Case, foundation: Foundation) -> bool:
+    return any(block.name == foundation.name and embedment.depth > 0.0
+               for block, embedment in zip(case.foundations, case.embedments, strict=True))
 
 
 def _shape(contact: Contact) -> str:
@@ -108,13 +115,15 @@ def of_shapes(case: Case, shapes: Sequence[ShapeError | None]) -> Iterator[str]:
         ratio = _side_ratio(block.contact)
         if shape is not None and (ratio > _LARGEST_ASPECT or shape.share > _LARGEST_SHARE):
             yield (f'{block.name}: contact is {ratio:.3g} times as long as wide; '
-                   f'{model_error(case, block, shape)}; support.model {BOUNDARY_ELEMENTS} takes '
-                   'it as it is')
+                   f'{model_error(case, block, shape)}; ' + (
+                       'no model here knows the shape of a block in the ground' if _is_embedded(
+                           case, block) else
+                       f'support.model {BOUNDARY_ELEMENTS} takes it as it is'))
 
 
 def of_site(case: Case, soil_models: Sequence[SoilModel]) -> Iterator[tuple[str, str]]:
     """Yield how much blocks on one ground move each other, and where probes on it are."""
-    if not (len(soil_models) == 1 and isinstance(soil_models[0], BoundaryElementModel)):
+    if not (len(soil_models) == 1 and isinstance(soil_models[0], SiteGround)):
         return
     found = np.abs(soil_models[0].compliance(np.array([case.speed_range[1]]))[0])
     own = np.sqrt(np.diagonal(found))
@@ -141,8 +150,11 @@ def of_neighbours(case: Case) -> Iterator[str]:
             clear = gap(block.contact, other.contact, apart=apart)
             yield (f'{block.name}: stands {max(clear, 0.0):.3g} m beside {other.name}; each is '
                    'taken as alone on the ground: a load on one moves the other by up to '
-                   f'{coupling:.0%} of its own motion, and its own changes by up to {change:.0%}; '
-                   f'support.model {BOUNDARY_ELEMENTS} couples them')
+                   f'{coupling:.0%} of its own motion, and its own changes by up to {change:.0%} '
+                   '(two squares on a half-space); ' + (
+                       'no model here couples blocks in the ground' if _is_embedded(
+                           case, block) or _is_embedded(case, other) else
+                       f'support.model {BOUNDARY_ELEMENTS} couples them'))
 
 
 def band_contents(case: Case) -> str:

@@ -16,7 +16,7 @@ from rotorsoil_ros.case.design.influence import extremes, influences
 from rotorsoil_ros.case.design.margins import near_modes
 from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
 from rotorsoil_ros.case.design.rigidity import of_rigidity
-from rotorsoil_ros.case.models import shape_errors
+from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, HOUSING
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError

@@ -1,9 +1,17 @@
 """Which tables the ground of a case needs: solved, or out of the cache."""
 
+from functools import lru_cache
+
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.entries.ground import infinite_range, proportions
-from rotorsoil_ros.case.entries.site import site_reach
+from rotorsoil_ros.case.entries.site import layered_site, site_reach
 from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
+from rotorsoil_ros.ground.boundary.layered_model import (
+    LAYERED_SITE_ALGORITHM,
+    LayeredSite,
+    LayeredSiteModel,
+    LayeredSiteTable,
+)
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BOUNDARY_ALGORITHM, BoundaryTable
@@ -44,7 +52,7 @@ def infinite_element_model(
 
 
 def thin_layer_model(
-    ground: LayeredSoil, contact: Contact, embedment: Embedment, *, cache: Cache,
+    ground: LayeredSoil, contact: Contact, embedment: Embedment, *, cache: Cache | None,
     speed_range: tuple[float, float],
 ) -> ThinLayerModel:
     """
@@ -54,13 +62,15 @@ def thin_layer_model(
     ----------
     ground, contact, embedment
         As `ThinLayerModel.solved`.
-    cache : Cache
-        Where dimensionless tables lie.
+    cache : Cache or None
+        Where dimensionless tables lie; without one they are kept in this process.
     speed_range : tuple of two floats
         Rotor speeds to be covered [rad/s].
 
     """
     scaled = proportions(ground, contact, embedment, speed_range)
+    if cache is None:
+        return ThinLayerModel(ground, contact, _layers_once(scaled), embedment)
     key = layers_key(scaled)
     stored = cache.load('compliance', key)
     if stored is not None:
@@ -68,6 +78,12 @@ def thin_layer_model(
     table = scaled.table()
     cache.store('compliance', key, table.to_arrays())
     return ThinLayerModel(ground, contact, table, embedment)
+
+
+@lru_cache(maxsize=64)
+def _layers_once(scaled: Proportions) -> LayeredTable:
+    """Return the table of a ground that is looked at more than once, as an input by itself."""
+    return scaled.table()
 
 
 def layers_key(scaled: Proportions) -> str:
@@ -101,6 +117,44 @@ def boundary_element_model(
         for ratio in sorted({min(max(end, 0.0), HIGHEST_POISSON_RATIO) for end in ends})))
 
 
+def layered_site_model(
+    ground: LayeredSoil, site: Site, *, cache: Cache | None, speed_range: tuple[float, float],
+) -> LayeredSiteModel:
+    """
+    Return boundary elements on layers, solved unless a site of these proportions was before.
+
+    Parameters
+    ----------
+    ground, site
+        As `LayeredSiteModel.solved`.
+    cache : Cache or None
+        As in `thin_layer_model`.
+    speed_range : tuple of two floats
+        Rotor speeds to be covered [rad/s].
+
+    """
+    scaled = layered_site(ground, site, speed_range)
+    if cache is None:
+        return LayeredSiteModel(ground, site, _site_once(scaled))
+    key = layered_site_key(scaled)
+    stored = cache.load('compliance', key)
+    if stored is not None:
+        return LayeredSiteModel(ground, site, LayeredSiteTable.from_arrays(scaled, stored))
+    table = scaled.table()
+    cache.store('compliance', key, table.to_arrays())
+    return LayeredSiteModel(ground, site, table)
+
+
+@lru_cache(maxsize=64)
+def _site_once(scaled: LayeredSite) -> LayeredSiteTable:
+    return scaled.table()
+
+
+def layered_site_key(scaled: LayeredSite) -> str:
+    """Return what identifies a table of a site on layers: its ratios and how far it reaches."""
+    return content_key('site on layers', LAYERED_SITE_ALGORITHM, scaled)
+
+
 def _boundary_table(
     site: Site, poisson_ratio: float, loss_factor: float, a0_max: float, cache: Cache,
 ) -> BoundaryTable:
@@ -127,8 +181,10 @@ def compliance_key(soil: Soil, geometry: str, a0_min: float, a0_max: float) -> s
                        soil.loss_factor, a0_min, a0_max)
 
 
-def key_of(model: BoundaryElementModel | InfiniteElementModel) -> str:
+def key_of(model: BoundaryElementModel | InfiniteElementModel | LayeredSiteModel) -> str:
     """Return what identifies the dimensionless table of a model."""
+    if isinstance(model, LayeredSiteModel):
+        return layered_site_key(model.table.of)
     if isinstance(model, BoundaryElementModel):
         own = model.tables[0]
         return site_key(own.site, own.poisson_ratio, own.loss_factor, own.a0_max)

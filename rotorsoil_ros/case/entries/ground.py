@@ -129,9 +129,10 @@ class GroundEntries:
             raise self.faults.error('soil', problem='is missing; the support model '
                                                     f'{support.model} needs it')
         if isinstance(entries.soil, schema.LayersEntry) and support.model not in (
-                THIN_LAYERS, 'table'):
+                THIN_LAYERS, BOUNDARY_ELEMENTS, 'table'):
             raise self.faults.error('support', 'model', problem=(
-                f'must be {THIN_LAYERS} on soil.layers, got {support.model}, which knows a '
+                f'must be {THIN_LAYERS} or {BOUNDARY_ELEMENTS} on soil.layers, got '
+                f'{support.model}, which knows a '
                 'homogeneous half-space only' + (
                     ': cones on rock miss its resonance by a factor of up to 2.3 and radiate '
                     'where nothing can' if support.model == 'cone' else '')))

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.ground.boundary.effort import highest_a0, HIGHEST_POISSON_RATIO
+from rotorsoil_ros.ground.boundary.layered_model import LayeredSite
 from rotorsoil_ros.ground.boundary.site import Site
+from rotorsoil_ros.ground.layers.profile import LayeredSoil
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.foundation import Foundation
 
@@ -74,6 +76,24 @@ def site_reach(site: Site, soil: Soil, speed_range: tuple[float, float]) -> floa
     return running
 
 
+def layered_site(
+    ground: LayeredSoil, site: Site, speed_range: tuple[float, float],
+) -> LayeredSite:
+    """
+    Return the proportions of a site on layers for some speeds [rad/s].
+
+    Raises
+    ------
+    RotorSoilError
+        If speeds, blocks or layers are beyond the method's reach.
+
+    """
+    found = LayeredSite.of(ground, site, omega_max=speed_range[1])
+    with suppress(RotorSoilError):  # at such speeds the running frequency has to do
+        return LayeredSite.of(ground, site, omega_max=HIGHEST_ORDER * speed_range[1])
+    return found
+
+
 @dataclass(frozen=True)
 class SiteEntries:
     """Builds the probes on the ground and says at which key a site was refused."""
@@ -87,11 +107,6 @@ class SiteEntries:
             raise self.faults.error('ground', 'probes', problem=(
                 f'need the support model {BOUNDARY_ELEMENTS}, which alone tells the motion of '
                 f'the ground beside the blocks, got {entries.support.model}'))
-        spread = entries.uncertainty
-        if entries.ground.probes and spread is not None and spread.rock_depth is not None:
-            raise self.faults.error('ground', 'probes', problem=(
-                'tell the motion of a half-space only, got uncertainty.rock_depth too, which puts '
-                'rock below it'))
         return tuple(GroundProbe(entry.name, entry.place.x, entry.place.y)
                      for entry in entries.ground.probes)
 
@@ -106,6 +121,11 @@ class SiteEntries:
         for index, probe in enumerate(case.ground_probes):
             with faults.at('ground', 'probes', index):
                 site_of(case.foundations, [probe])
+        site = site_of(case.foundations, case.ground_probes)
+        if case.ground is not None:
+            with faults.at('soil', entry=faults.entries.soil):
+                layered_site(case.ground, site, case.speed_range)
+            return
         at_soil = soil.poisson_ratio > HIGHEST_POISSON_RATIO
         with faults.at('soil' if at_soil else 'speed_range_rpm', entry=faults.entries.soil):
-            site_reach(site_of(case.foundations, case.ground_probes), soil, case.speed_range)
+            site_reach(site, soil, case.speed_range)

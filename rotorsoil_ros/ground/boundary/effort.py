@@ -67,6 +67,12 @@ def highest_a0(site: Site, a0: float) -> float:
     require(a0 <= HIGHEST_A0[-1], 'a0', f'<= {HIGHEST_A0[-1]:g} [-] (omega b / c_s with the '
             'shortest half side b) for boundary elements: lower speed_range_rpm', a0)
     highest = next(edge for edge in HIGHEST_A0 if edge >= a0)
+    require_solvable(site, highest)
+    return highest
+
+
+def require_solvable(site: Site, highest: float) -> None:
+    """Raise a RotorSoilError if elements for waves of an a0 cannot be solved in a minute or so."""
     if site.rectangle is None:
         needed, most = patch_unknowns(site.placed, highest), _MOST_UNKNOWNS
     else:
@@ -74,5 +80,5 @@ def highest_a0(site: Site, a0: float) -> float:
     if needed > most:
         raise RotorSoilError(
             f'boundary elements must be at most {most} (a minute or two), got {needed} for the '
-            f'size of the blocks at a0 {a0:.3g}: lower speed_range_rpm, or take infinite_elements')
-    return highest
+            f'size of the blocks at a0 {highest:.3g}: lower speed_range_rpm, or take '
+            'infinite_elements')

@@ -1,12 +1,11 @@
 """How a place on the surface answers a force at another, for all directions."""
 
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.boundary.statics import static_kernels
-from rotorsoil_ros.ground.boundary.waves import SurfaceWaves
 
 # Motion and force that a kernel joins, axes x, y, z (down); the others follow from reciprocity.
 PAIRS = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz')
@@ -17,18 +16,55 @@ ODD = {'xx': (False, False), 'yy': (False, False), 'zz': (False, False), 'xy': (
 WaveKernels: TypeAlias = dict[str, ComplexArray]
 
 
-def wave_kernels(
-    waves: SurfaceWaves, a0: float, x: FloatArray, y: FloatArray,
-) -> WaveKernels:
+class SwingingWaves(Protocol):
+    """What a ground does at one frequency beyond what its top material does at rest."""
+
+    @property
+    def poisson_ratio(self) -> float:
+        """Of the material at the surface [-]."""
+        ...
+
+    @property
+    def loss_factor(self) -> float:
+        """Of the material at the surface [-]."""
+        ...
+
+    @property
+    def wavenumber(self) -> complex:
+        """Of its shear waves, k_s, per unit of length."""
+        ...
+
+    def __call__(self, distance: FloatArray) -> ComplexArray:
+        """Return k_s times what is in `SurfaceWaves`, up, alike, turned, pulled, (..., 4)."""
+        ...
+
+
+class GroundWaves(Protocol):
+    """A ground at any frequency."""
+
+    @property
+    def poisson_ratio(self) -> float:
+        """Of the material at the surface [-]."""
+        ...
+
+    @property
+    def loss_factor(self) -> float:
+        """Of the material at the surface [-]."""
+        ...
+
+    def at(self, a0: float) -> SwingingWaves:
+        """Return its waves at a frequency, omega times the unit of length over c_s."""
+        ...
+
+
+def wave_kernels(waves: SwingingWaves, x: FloatArray, y: FloatArray) -> WaveKernels:
     """
-    Return 2 pi q times the motion by waves in a half-space with G = rho = 1.
+    Return 2 pi q times the motion by waves, G = rho = 1 at the surface.
 
     Parameters
     ----------
-    waves : SurfaceWaves
-        Of this soil.
-    a0 : float
-        omega times the unit of length over c_s [-].
+    waves : SwingingWaves
+        Of the ground at one frequency.
     x, y : float arrays that broadcast
         From the force to the place that moves; nothing is returned for no distance.
 
@@ -37,16 +73,10 @@ def wave_kernels(
     apart = r > 0.0
     safe = np.where(apart, r, 1.0)
     c, s = x / safe, y / safe
-    scale = wavenumber(a0, waves.loss_factor) * apart
-    up, alike, apart_turned, pulled = np.moveaxis(waves(a0 * r) * scale[..., None], -1, 0)
+    up, alike, apart_turned, pulled = np.moveaxis(waves(r) * apart[..., None], -1, 0)
     turned = apart_turned * (c**2 - s**2)
     return {'xx': alike + turned, 'yy': alike - turned, 'zz': up,
             'xy': 2.0 * apart_turned * c * s, 'xz': pulled * c, 'yz': pulled * s}
-
-
-def wavenumber(a0: float, loss_factor: float) -> complex:
-    """Return k_s per unit of length, a0 / sqrt(1 + i eta)."""
-    return complex(a0 / np.sqrt(1.0 + 1j * loss_factor))
 
 
 def assembled(kernels: WaveKernels) -> ComplexArray:
@@ -58,15 +88,15 @@ def assembled(kernels: WaveKernels) -> ComplexArray:
 
 
 def motion_by_forces(
-    waves: SurfaceWaves, a0: float, places: FloatArray, nodes: FloatArray,
+    waves: SwingingWaves, places: FloatArray, nodes: FloatArray,
 ) -> ComplexArray:
     """
-    Return how places move under forces on the surface, G = rho = 1.
+    Return how places move under forces on the surface, G = rho = 1 there.
 
     Parameters
     ----------
-    waves, a0
-        As `wave_kernels`.
+    waves : SwingingWaves
+        Of the ground at one frequency.
     places, nodes : (p, 2), (n, 2) float arrays
         x and y of what moves and of the forces; no place on a node.
 
@@ -80,7 +110,7 @@ def motion_by_forces(
     r = np.hypot(x, y)
     at_rest = static_kernels(waves.poisson_ratio, {
         'r': 1.0 / r, 'xx': x**2 / r**3, 'xy': x * y / r**3, 'x': x / r**2, 'y': y / r**2})
-    swinging = wave_kernels(waves, a0, x, y)
+    swinging = wave_kernels(waves, x, y)
     return assembled({pair: at_rest[pair] + swinging[pair] for pair in PAIRS}) / (
         2.0 * np.pi * (1.0 + 1j * waves.loss_factor))
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import k0, k1
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.ground.boundary.kernels import SwingingWaves
 
 _ZETA_3 = 1.2020569031595942
 # Terms e^(-2 pi n) of the lattice sums below this are nothing.
@@ -76,27 +77,21 @@ def kink_coefficients(poisson_ratio: float) -> tuple[float, float, float]:
 
 
 def mended(
-    origin: ComplexArray, wavenumber: complex, poisson_ratio: float,
-    of_r: FloatArray, of_difference: FloatArray,
+    waves: SwingingWaves, of_r: FloatArray, of_difference: FloatArray,
 ) -> ComplexArray:
     """
     Return what each node adds to its own motion, for x, y and z, (3, ...).
 
     Parameters
     ----------
-    origin : (4,) complex array
-        The waves at no distance, as `SurfaceWaves` gives them.
-    wavenumber : complex
-        k_s.
-    poisson_ratio : float
-        nu [-].
+    waves : SwingingWaves
+        Of the ground: their kinks are those of the material at its surface.
     of_r, of_difference : float arrays
         As `lattice_errors`.
 
     """
-    of_z, of_x, of_both = kink_coefficients(poisson_ratio)
-    square = wavenumber**2
-    along = wavenumber * origin[1] + square * of_x * of_r
+    of_z, of_x, of_both = kink_coefficients(waves.poisson_ratio)
+    origin, square = waves(np.zeros(1))[0], waves.wavenumber**2
+    along = origin[1] + square * of_x * of_r
     across = square * of_both * of_difference
-    return np.stack([along - across, along + across,
-                     wavenumber * origin[0] + square * of_z * of_r])
+    return np.stack([along - across, along + across, origin[0] + square * of_z * of_r])

@@ -1,5 +1,6 @@
 """What blocks of any plan on a half-space give way by, from boundary elements."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +16,97 @@ from rotorsoil_ros.ground.soil import Contact, Soil, static_scale
 _ROUNDING = 1e-12
 
 
+class SiteGround(ABC):
+    """Ground below rigid massless contacts that are coupled through it."""
+
+    __slots__ = ()
+
+    site: Site
+
+    @property
+    @abstractmethod
+    def material(self) -> Soil:
+        """What makes frequencies and compliances dimensionless: the material at the surface."""
+
+    @property
+    @abstractmethod
+    def a0_max(self) -> float:
+        """Highest a0 that is known [-]."""
+
+    @abstractmethod
+    def scaled_values(self, a0: FloatArray) -> ComplexArray:
+        """Return compliance above motion of the points, (n, 6 k + 3 p, 6 k), no dimension."""
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks that stand on this ground, k."""
+        return len(self.site.blocks)
+
+    @property
+    def unit(self) -> float:
+        """Frequency at which a0 is one [rad/s]."""
+        return self.material.shear_wave_speed / self.site.length
+
+    @property
+    def omega_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency that the tables cover [rad/s]."""
+        return 0.0, self.a0_max * self.unit
+
+    def compliance(self, omega: FloatArray) -> ComplexArray:
+        """
+        Return the compliance of the massless contacts.
+
+        Parameters
+        ----------
+        omega : (n,) float array
+            Excitation frequencies [rad/s].
+
+        Returns
+        -------
+        (n, 6 k, 6 k) complex array
+            Over (x, y, z, rx, ry, rz) of each block about its centre [m/N], [1/N], [rad/(N m)].
+
+        Raises
+        ------
+        OutOfTableError
+            If a frequency lies outside `omega_range`.
+
+        """
+        size = 6 * self.blocks
+        return self._values(omega)[..., :size, :]
+
+    def point_motion(self, omega: FloatArray) -> ComplexArray:
+        """
+        Return the motion of the points on the ground, (n, 3 p, 6 k) over (x, y, z) of each.
+
+        Per force and moment of each block on the ground [m/N], [1/N]; parameters and errors as
+        in `compliance`.
+        """
+        return self._values(omega)[..., 6 * self.blocks:, :]
+
+    def _values(self, omega: FloatArray) -> ComplexArray:
+        omega = np.asarray(omega, dtype=float)
+        highest = self.omega_range[1]
+        inside = (omega >= 0.0) & (omega <= highest * (1.0 + _ROUNDING))
+        if not inside.all():
+            raise OutOfTableError(
+                f'frequency must be in [0, {highest:g}] rad/s, where the boundary elements were '
+                f'solved, got {omega[~inside][0]:g}')
+        a0 = np.minimum(omega.ravel() / self.unit, self.a0_max)
+        return self._dimensioned(self.scaled_values(a0)).reshape(
+            *omega.shape, -1, 6 * self.blocks)
+
+    def _dimensioned(self, values: ComplexArray) -> ComplexArray:
+        """Give dimensionless values, (n, 6 k + 3 p, 6 k), their units."""
+        length = self.site.length
+        # A rotation is over a length, and a moment is a force at it.
+        own = np.tile([1.0] * 3 + [1.0 / length] * 3, self.blocks)
+        rows = np.concatenate([own, np.ones(3 * len(self.site.points))])
+        return np.asarray(values * np.outer(rows, own) / (self.material.shear_modulus * length))
+
+
 @dataclass(frozen=True, slots=True)
-class BoundaryElementModel:
+class BoundaryElementModel(SiteGround):
     """
     Rigid massless contacts welded to one half-space, coupled through it.
 
@@ -85,65 +175,20 @@ class BoundaryElementModel:
             a0_max=a0_max),))
 
     @property
-    def blocks(self) -> int:
-        """Number of blocks that stand on this ground, k."""
-        return len(self.site.blocks)
+    def material(self) -> Soil:
+        """The half-space."""
+        return self.soil
 
     @property
-    def omega_range(self) -> tuple[float, float]:
-        """Lowest and highest frequency that the tables cover [rad/s]."""
-        highest = min(table.a0_max for table in self.tables)
-        return 0.0, highest * self.soil.shear_wave_speed / self.site.length
+    def a0_max(self) -> float:
+        """Highest a0 that all tables cover [-]."""
+        return min(table.a0_max for table in self.tables)
 
     def on(self, soil: Soil) -> 'BoundaryElementModel':
         """Return the same blocks on another soil, from the same tables."""
         return replace(self, soil=soil)
 
-    def compliance(self, omega: FloatArray) -> ComplexArray:
-        """
-        Return the compliance of the massless contacts.
-
-        Parameters
-        ----------
-        omega : (n,) float array
-            Excitation frequencies [rad/s].
-
-        Returns
-        -------
-        (n, 6 k, 6 k) complex array
-            Over (x, y, z, rx, ry, rz) of each block about its centre [m/N], [1/N], [rad/(N m)].
-
-        Raises
-        ------
-        OutOfTableError
-            If a frequency lies outside `omega_range`.
-
-        """
-        size = 6 * self.blocks
-        return self._values(omega)[..., :size, :]
-
-    def point_motion(self, omega: FloatArray) -> ComplexArray:
-        """
-        Return the motion of the points on the ground, (n, 3 p, 6 k) over (x, y, z) of each.
-
-        Per force and moment of each block on the ground [m/N], [1/N]; parameters and errors as
-        in `compliance`.
-        """
-        return self._values(omega)[..., 6 * self.blocks:, :]
-
-    def _values(self, omega: FloatArray) -> ComplexArray:
-        omega = np.asarray(omega, dtype=float)
-        highest = self.omega_range[1]
-        inside = (omega >= 0.0) & (omega <= highest * (1.0 + _ROUNDING))
-        if not inside.all():
-            raise OutOfTableError(
-                f'frequency must be in [0, {highest:g}] rad/s, where the boundary elements were '
-                f'solved, got {omega[~inside][0]:g}')
-        a0 = omega.ravel() * (self.site.length / self.soil.shear_wave_speed)
-        return self._dimensioned(self._mixed(a0)).reshape(
-            *omega.shape, -1, 6 * self.blocks)
-
-    def _mixed(self, a0: FloatArray) -> ComplexArray:
+    def scaled_values(self, a0: FloatArray) -> ComplexArray:
         """Return what the tables say for the Poisson's ratio of the soil, without dimension."""
         ratio, loss = self.soil.poisson_ratio, self.soil.loss_factor
         known = [table.poisson_ratio for table in self.tables]
@@ -160,11 +205,3 @@ class BoundaryElementModel:
         points = np.tile(static_scale(known[nearest], ratio)[:3], len(self.site.points))
         return self.tables[nearest].values(a0, loss) * np.outer(
             np.concatenate([scale, points]), scale)
-
-    def _dimensioned(self, values: ComplexArray) -> ComplexArray:
-        """Give dimensionless values, (n, 6 k + 3 p, 6 k), their units."""
-        length = self.site.length
-        # A rotation is over a length, and a moment is a force at it.
-        own = np.tile([1.0] * 3 + [1.0 / length] * 3, self.blocks)
-        rows = np.concatenate([own, np.ones(3 * len(self.site.points))])
-        return np.asarray(values * np.outer(rows, own) / (self.soil.shear_modulus * length))

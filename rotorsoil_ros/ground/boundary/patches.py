@@ -1,4 +1,4 @@
-"""What contacts of any plan on a half-space give way by, alone or several: patches of traction."""
+"""What contacts of any plan on the ground give way by, alone or several: patches of traction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.boundary.effort import COARSE, FINE, halves, patch_unknowns
 from rotorsoil_ros.ground.boundary.kernels import (
     assembled,
+    GroundWaves,
     motion_by_forces,
     ODD,
     PAIRS,
+    SwingingWaves,
     upwards,
     wave_kernels,
     WaveKernels,
-    wavenumber,
 )
 from rotorsoil_ros.ground.boundary.lattice import lattice_errors, mended
 from rotorsoil_ros.ground.boundary.statics import primitives, static_kernels, StaticKernels
-from rotorsoil_ros.ground.boundary.waves import SurfaceWaves
 from rotorsoil_ros.ground.plan import Part
 
 # Edges this near to each other, over the side that they lie on, are one.
@@ -165,28 +165,27 @@ class _Mesh:
         return found.reshape(3 * len(x), -1)
 
     def compliance(
-        self, waves: SurfaceWaves, a0: float, points: FloatArray,
+        self, waves: SwingingWaves, points: FloatArray,
     ) -> tuple[ComplexArray, ComplexArray]:
         """Return compliance (6 k, 6 k) and motion of points (p, 3, 6 k), as the solver."""
-        swinging = self._waves(waves, a0)
+        swinging = self._waves(waves)
         flexibility = assembled({
             pair: self._at_rest[pair] + swinging[pair] for pair in PAIRS}) / (
                 2.0 * math.pi * (1.0 + 1j * waves.loss_factor))
         traction = np.linalg.solve(flexibility, self._rigid)
         stiffness = self._rigid.T @ traction
         compliance = np.linalg.inv(0.5 * (stiffness + stiffness.T))
-        motion = motion_by_forces(waves, a0, points, self.places) @ (traction @ compliance)
+        motion = motion_by_forces(waves, points, self.places) @ (traction @ compliance)
         return np.asarray(compliance), upwards(motion, len(points))
 
-    def _waves(self, waves: SurfaceWaves, a0: float) -> WaveKernels:
+    def _waves(self, waves: SwingingWaves) -> WaveKernels:
         """Return the waves between all nodes, (n, n); each pair is computed once."""
         places = self.places
         first, second = np.triu_indices(len(places), 1)
         x, y = (places[first] - places[second]).T
-        own = mended(waves(np.zeros(1))[0], wavenumber(a0, waves.loss_factor),
-                     waves.poisson_ratio, *self._lattice)
+        own = mended(waves, *self._lattice)
         found = {}
-        for pair, values in wave_kernels(waves, a0, x, y).items():
+        for pair, values in wave_kernels(waves, x, y).items():
             full = np.zeros((len(places), len(places)), dtype=complex)
             full[first, second] = values
             full[second, first] = values if ODD[pair][0] is ODD[pair][1] else -values
@@ -199,12 +198,12 @@ class _Mesh:
 @dataclass(frozen=True, eq=False)
 class PatchSolver:
     """
-    Rigid contacts of any plan, welded to one half-space.
+    Rigid contacts of any plan, welded to one ground.
 
     Attributes
     ----------
-    waves : SurfaceWaves
-        Of the soil, as far as the farthest two patches or points are apart.
+    waves : GroundWaves
+        Of the ground, as far as the farthest two patches or points are apart.
     blocks : tuple of tuples of Part
         The rectangles of each block, in one frame.
     centres : (k, 2) float array
@@ -227,7 +226,7 @@ class PatchSolver:
 
     """
 
-    waves: SurfaceWaves
+    waves: GroundWaves
     blocks: tuple[tuple[Part, ...], ...]
     centres: FloatArray
     highest: float
@@ -255,7 +254,7 @@ class PatchSolver:
 
     def compliance(self, a0: float) -> tuple[ComplexArray, ComplexArray]:
         """
-        Solve at one frequency, G = rho = 1.
+        Solve at one frequency, G = rho = 1 at the surface.
 
         Returns
         -------
@@ -265,7 +264,8 @@ class PatchSolver:
             Of the points along x, y, z (up) per force and moment on the blocks.
 
         """
-        rough, better = (mesh.compliance(self.waves, a0, self.points) for mesh in self._meshes)
+        waves = self.waves.at(a0)
+        rough, better = (mesh.compliance(waves, self.points) for mesh in self._meshes)
         share = COARSE**2 / (FINE**2 - COARSE**2)
         compliance, motion = ((1.0 + share) * fine - share * coarse
                               for coarse, fine in zip(rough, better, strict=True))

@@ -10,17 +10,16 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.boundary.effort import COARSE, FINE, nodes_along
 from rotorsoil_ros.ground.boundary.kernels import (
+    GroundWaves,
     motion_by_forces,
     ODD,
     PAIRS,
     upwards,
     wave_kernels,
     WaveKernels,
-    wavenumber,
 )
 from rotorsoil_ros.ground.boundary.lattice import lattice_errors, mended
 from rotorsoil_ros.ground.boundary.statics import primitives, static_kernels, StaticKernels
-from rotorsoil_ros.ground.boundary.waves import SurfaceWaves
 
 # Functions along a half side, at least and at most, and how they grow with the ratio of the sides.
 _LEAST_FUNCTIONS, _MOST_FUNCTIONS = 4, 6
@@ -152,12 +151,12 @@ def _parity(of_vertical: Parity, component: str) -> Parity:
 @dataclass(frozen=True, eq=False)
 class RectangleSolver:
     """
-    Rigid rectangle of half sides 1 along x and `ratio` along y, welded to a half-space.
+    Rigid rectangle of half sides 1 along x and `ratio` along y, welded to the ground.
 
     Attributes
     ----------
-    waves : SurfaceWaves
-        Of the soil, as far as the diagonal of the rectangle.
+    waves : GroundWaves
+        Of the ground, as far as the diagonal of the rectangle.
     ratio : float
         At least 1 [-].
     highest : float
@@ -181,7 +180,7 @@ class RectangleSolver:
 
     """
 
-    waves: SurfaceWaves
+    waves: GroundWaves
     ratio: float
     highest: float
     points: FloatArray
@@ -217,7 +216,7 @@ class RectangleSolver:
 
     def compliance(self, a0: float) -> tuple[ComplexArray, ComplexArray]:
         """
-        Solve at one frequency, G = rho = 1.
+        Solve at one frequency, G = rho = 1 at the surface.
 
         Returns
         -------
@@ -228,9 +227,9 @@ class RectangleSolver:
 
         """
         x, y = self._nodes
-        waves = wave_kernels(self.waves, a0, x.apart[:, None], y.apart)
-        kinks = mended(self.waves(np.zeros(1))[0], wavenumber(a0, self.waves.loss_factor),
-                       self.waves.poisson_ratio, *self._lattice)
+        swinging = self.waves.at(a0)
+        waves = wave_kernels(swinging, x.apart[:, None], y.apart)
+        kinks = mended(swinging, *self._lattice)
         compliance = np.zeros((6, 6), dtype=complex)
         forces = np.zeros((3, 2 * len(x.place), 2 * len(y.place), 6), dtype=complex)
         for number, (parity, motions) in enumerate(_CLASSES):
@@ -241,7 +240,7 @@ class RectangleSolver:
             dofs = list(motions)
             compliance[np.ix_(dofs, dofs)] = found
             forces[..., dofs] = self._spread(parity, traction @ found)
-        motion = motion_by_forces(self.waves, a0, self.points, self._grid) @ forces.reshape(-1, 6)
+        motion = motion_by_forces(swinging, self.points, self._grid) @ forces.reshape(-1, 6)
         return compliance, upwards(motion, len(self.points))
 
     def _flexibility(self, number: int, waves: WaveKernels, kinks: ComplexArray) -> ComplexArray:

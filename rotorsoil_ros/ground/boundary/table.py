@@ -67,11 +67,8 @@ class BoundaryTable:
         size = 6 * len(self.site.blocks)
         rows, columns = self.entries.T
         ahead = delays(self.site)[rows, columns]
-        flat = self.function(point) * np.exp(-np.outer(point, ahead)) / (1.0 + 1j * loss_factor)
-        found = np.zeros((len(a0), size + 3 * len(self.site.points), size), dtype=complex)
-        found[:, rows, columns] = flat
-        inside = rows < size
-        found[:, columns[inside], rows[inside]] = flat[:, inside]
+        found = spread(self.function(point) * np.exp(-np.outer(point, ahead)) / (
+            1.0 + 1j * loss_factor), self.entries, self.site)
         own = np.arange(size)
         found[:, own, own] += self.loss * self._at_rest / (
             (1.0 + point) * (1.0 + 1j * loss_factor))[:, None]
@@ -123,6 +120,16 @@ class BoundaryTable:
             raise RotorSoilError('not a table of boundary elements: wrong shapes or not finite')
         return cls(site, poisson_ratio, loss_factor, a0_max, function, entries, measured,
                    int(solves), int(unknowns), loss)
+
+
+def spread(values: ComplexArray, entries: IntArray, site: Site) -> ComplexArray:
+    """Return entries, (n, q), at their places and at those reciprocal, (n, 6 k + 3 p, 6 k)."""
+    size, (rows, columns) = 6 * len(site.blocks), entries.T
+    found = np.zeros((len(values), size + 3 * len(site.points), size), dtype=complex)
+    found[:, rows, columns] = values
+    inside = rows < size
+    found[:, columns[inside], rows[inside]] = values[:, inside]
+    return found
 
 
 def delays(site: Site) -> FloatArray:

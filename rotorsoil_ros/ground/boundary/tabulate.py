@@ -8,12 +8,13 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
+from rotorsoil_ros.ground.boundary.kernels import GroundWaves
 from rotorsoil_ros.ground.boundary.patches import PatchSolver
 from rotorsoil_ros.ground.boundary.rectangle import RectangleSolver
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BoundaryTable, delays
 from rotorsoil_ros.ground.boundary.waves import SurfaceWaves
-from rotorsoil_ros.ground.joining import joined, laplace_point
+from rotorsoil_ros.ground.joining import joined
 
 # Lowest frequency that is solved, over the highest; below, the functions know themselves to be
 # even and odd about zero.
@@ -41,7 +42,8 @@ class SiteSolver:
     unknowns: int
 
     @classmethod
-    def of(cls, site: Site, waves: SurfaceWaves, a0_max: float) -> 'SiteSolver':
+    def of(cls, site: Site, waves: GroundWaves, a0_max: float) -> 'SiteSolver':
+        """Choose for waves as short as those of an a0."""
         points = np.array(site.points).reshape(-1, 2)
         part = site.rectangle
         if part is None:
@@ -53,7 +55,7 @@ class SiteSolver:
         return cls(rectangle, across, rectangle.unknowns)
 
     def solve(self, a0: float) -> ComplexArray:
-        """Return compliance above motion of the points, (6 k + 3 p, 6 k), G = rho = 1."""
+        """Return compliance above motion of the points, (6 k + 3 p, 6 k), as its method."""
         compliance, motion = self.method.compliance(a0)
         if self.lies_across:
             # A mirror in x = y: it exchanges x and y and turns every rotation around.
@@ -82,7 +84,7 @@ def tabulated(
     solver = SiteSolver.of(
         site, SurfaceWaves.of(poisson_ratio, loss_factor, 1.01 * a0_max * site.extent), a0_max)
     stiff = 1.0 + 1j * loss_factor
-    entries = _entries(solver.solve(_LOWEST * a0_max))
+    entries = entries_of(solver.solve(_LOWEST * a0_max))
     rows, columns = entries.T
     ahead, slow = delays(site)[rows, columns], math.sqrt(abs(stiff))
 
@@ -93,7 +95,7 @@ def tabulated(
         return np.asarray(found * stiff * np.exp(point * ahead))
 
     found = joined('these contacts by boundary elements', solve, (_LOWEST * a0_max, a0_max),
-                   loss_factor=loss_factor, scale=lambda values: _scale(values, entries),
+                   loss_factor=loss_factor, scale=lambda values: scale_of(values, entries),
                    tolerance=tolerance, accepted=_ACCEPTED)
     return passive(BoundaryTable(site, poisson_ratio, loss_factor, a0_max, found.function, entries,
                                  found.measured_error, found.solves, solver.unknowns))
@@ -101,20 +103,42 @@ def tabulated(
 
 def passive(table: BoundaryTable) -> BoundaryTable:
     """Return a table whose loss is just large enough that it gives energy nowhere."""
-    a0 = table.a0_max * np.linspace(0.0, 1.0, _CHECKED)[1:] ** 2
-    needed = 0.0
-    for loss_factor in {0.0, table.loss_factor}:
-        size = 6 * len(table.site.blocks)
-        values = table.values(a0, loss_factor)[:, :size]
-        own = np.sqrt(table.values(np.zeros(1), 0.0)[0].diagonal().real)
-        gain = -np.linalg.eigvalsh(-values.imag / np.outer(own, own))[:, 0]
-        # What a late share of one would dissipate of each static compliance.
-        late = -(1.0 / (1.0 + laplace_point(a0, 0.0))).imag
-        needed = max(needed, float((gain / late).max()))
-    return replace(table, loss=_MARGIN * needed)
+    a0 = checked_at(table.a0_max)
+    size = 6 * len(table.site.blocks)
+    own = table.values(np.zeros(1), 0.0)[0, :size].diagonal().real.astype(float)
+    # What a late share of one would dissipate of each static compliance.
+    late = a0 / (1.0 + a0**2)
+    return replace(table, loss=max(needed_loss(
+        table.values(a0, loss_factor)[:, :size], own, late)
+        for loss_factor in {0.0, table.loss_factor}))
 
 
-def _entries(found: ComplexArray) -> IntArray:
+def checked_at(a0_max: float) -> FloatArray:
+    """Return the frequencies > 0 at which a table is looked at for energy."""
+    found: FloatArray = a0_max * np.linspace(0.0, 1.0, _CHECKED)[1:] ** 2
+    return found
+
+
+def needed_loss(values: ComplexArray, at_rest: FloatArray, late: FloatArray) -> float:
+    """
+    Return which share of its static compliance each motion has to lose so that none gives.
+
+    Parameters
+    ----------
+    values : (n, d, d) complex array
+        Compliance.
+    at_rest : (d,) float array
+        Its diagonal at rest.
+    late : (n,) float array
+        What a share of one dissipates of each static compliance.
+
+    """
+    own = np.sqrt(at_rest)
+    gain = -np.linalg.eigvalsh(-values.imag / np.outer(own, own))[:, 0]
+    return _MARGIN * max(0.0, float((gain / late).max()))
+
+
+def entries_of(found: ComplexArray) -> IntArray:
     """Return row and column of what is not zero by symmetry or reciprocity, (q, 2)."""
     size = found.shape[1]
     own = np.sqrt(np.abs(np.diagonal(found)))
@@ -125,7 +149,7 @@ def _entries(found: ComplexArray) -> IntArray:
     return np.argwhere(np.triu(there) | (np.arange(len(found)) >= size)[:, None])
 
 
-def _scale(values: ComplexArray, entries: IntArray) -> FloatArray:
+def scale_of(values: ComplexArray, entries: IntArray) -> FloatArray:
     """Return what an error of each entry is measured against, (n, q)."""
     rows, columns = entries.T
     size = columns.max() + 1

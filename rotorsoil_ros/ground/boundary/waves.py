@@ -41,6 +41,8 @@ class SurfaceWaves:
         nu and eta [-].
     reach : float
         Largest omega r / c_s that is known [-].
+    spline : CubicSpline
+        I_z, I_a, I_d, I_h less their static parts over omega r / c_s.
 
     Notes
     -----
@@ -60,7 +62,7 @@ class SurfaceWaves:
     poisson_ratio: float
     loss_factor: float
     reach: float
-    _spline: CubicSpline
+    spline: CubicSpline
 
     @classmethod
     def of(cls, poisson_ratio: float, loss_factor: float, reach: float) -> 'SurfaceWaves':
@@ -69,10 +71,37 @@ class SurfaceWaves:
         steps = math.ceil(2.0 * math.log2(max(reach, _SHORTEST)))
         return _tabulated(poisson_ratio, loss_factor, 2.0 ** (0.5 * steps))
 
+    def at(self, a0: float) -> 'WavesAt':
+        """Return the waves at a frequency, omega times the unit of length over c_s [-]."""
+        return WavesAt(self, a0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WavesAt:
+    """Waves on a half-space at one frequency, a0 per unit of length."""
+
+    surface: SurfaceWaves
+    a0: float
+
+    @property
+    def poisson_ratio(self) -> float:
+        """Of the half-space [-]."""
+        return self.surface.poisson_ratio
+
+    @property
+    def loss_factor(self) -> float:
+        """Of the half-space [-]."""
+        return self.surface.loss_factor
+
+    @property
+    def wavenumber(self) -> complex:
+        """Return k_s per unit of length, a0 / sqrt(1 + i eta)."""
+        return complex(self.a0 / np.sqrt(1.0 + 1j * self.loss_factor))
+
     def __call__(self, distance: FloatArray) -> ComplexArray:
-        """Return I_z, I_a, I_d, I_h less their static parts at omega r / c_s, (..., 4)."""
-        values: ComplexArray = self._spline(distance)
-        return values
+        """Return k_s times I_z, I_a, I_d, I_h less their static parts, (..., 4)."""
+        values: ComplexArray = self.surface.spline(self.a0 * distance)
+        return values * self.wavenumber
 
 
 @lru_cache(maxsize=64)

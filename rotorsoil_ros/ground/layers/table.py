@@ -21,14 +21,14 @@ _ROUNDING = 1e-12
 @dataclass(frozen=True, slots=True, eq=False)
 class LayeredTable:
     """
-    Compliance of a massless contact on layered ground, in units of the soil below its base.
+    What layered ground answers over frequency, in units of one of its soils.
 
     Attributes
     ----------
     edges : (p + 1,) float array
         Ends of the pieces, rising from 0: all but the ends are singular frequencies [-].
     pieces : tuple of p RationalMatrix
-        Functions of a0 with the entries `ENTRIES`.
+        Functions of a0: of a disc below whose base lies the soil of the units, `ENTRIES`.
     poorer : tuple of p RationalMatrix
         The same through fewer solves: both agree where the solves decide.
     measured_error : float
@@ -49,7 +49,7 @@ class LayeredTable:
 
     def compliance(self, a0: FloatArray) -> ComplexArray:
         """
-        Return the dimensionless compliances, (n, 7) over `ENTRIES`.
+        Return the dimensionless values, (n, q), of a disc over `ENTRIES`.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class LayeredTable:
                 f'{a0[~inside][0]:g}')
         piece = np.clip(np.searchsorted(self.edges, a0, side='right') - 1, 0,
                         len(self.pieces) - 1)
-        values = np.zeros((len(a0), len(ENTRIES)), dtype=complex)
+        values = np.zeros((len(a0), self.pieces[0].values.shape[1]), dtype=complex)
         for index in np.unique(piece):
             own = piece == index
             values[own] = self.pieces[index](a0[own].astype(complex))
@@ -89,9 +89,11 @@ class LayeredTable:
         }
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> 'LayeredTable':
+    def from_arrays(
+        cls, arrays: Mapping[str, npt.NDArray[Any]], width: int = len(ENTRIES),
+    ) -> 'LayeredTable':
         """
-        Return the table that `to_arrays` took apart.
+        Return the table that `to_arrays` took apart, with so many values of a frequency.
 
         Raises
         ------
@@ -110,7 +112,7 @@ class LayeredTable:
         except (KeyError, TypeError, ValueError) as problem:
             raise RotorSoilError(f'not a table of layered ground: {problem}') from problem
         if not (2 * len(edges) == len(ends) + 2 > 2
-                and values.shape == (len(support), len(ENTRIES))
+                and values.shape == (len(support), width)
                 and weights.shape == support.shape == (ends[-1],)
                 and all(np.isfinite(part).all() for part in (edges, support, values, weights))
                 and math.isfinite(error)):

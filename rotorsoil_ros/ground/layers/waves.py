@@ -61,12 +61,13 @@ class WavePencil:
     line: LineMatrices
 
     @cached_property
-    def _along(self) -> ComplexArray:
+    def along(self) -> ComplexArray:
         """Weight A_x of k^2 on motion along the way, int (lambda + 2 mu) N N^T."""
         return self.line.v_lambda + 2.0 * self.line.v_mu
 
     @cached_property
-    def _coupling(self) -> ComplexArray:
+    def coupling(self) -> ComplexArray:
+        """What joins motion along the way and downward, of k, int mu N' N^T - lambda N N'^T."""
         return self.line.e_mu.T - self.line.e_lambda
 
     @cached_property
@@ -74,10 +75,10 @@ class WavePencil:
         """Return matrices whose sum, the second times omega^2, has eigenvalues k^2."""
         line, size = self.line, len(self.line.v_mu)
         weight = np.zeros((2 * size, 2 * size), dtype=complex)
-        weight[:size, :size], weight[size:, size:] = self._along, line.v_mu
-        weight[size:, :size] = self._coupling.T
+        weight[:size, :size], weight[size:, size:] = self.along, line.v_mu
+        weight[size:, :size] = self.coupling.T
         static, inertia = np.zeros_like(weight), np.zeros_like(weight)
-        static[:size, :size], static[:size, size:] = -line.d_mu, -self._coupling
+        static[:size, :size], static[:size, size:] = -line.d_mu, -self.coupling
         static[size:, size:] = -(line.d_lambda + 2.0 * line.d_mu)
         inertia[:size, :size] = inertia[size:, size:] = line.v_rho
         both = np.linalg.solve(weight, np.concatenate([static, inertia], axis=1))
@@ -115,9 +116,9 @@ class WavePencil:
         line, k = self.line, found.k
         mass = (found.u * (line.v_rho @ found.u) + found.w * (line.v_rho @ found.w)).sum(axis=0)
         change = 2.0 * omega * mass / (
-            2.0 * k * (found.u * (self._along @ found.u)
+            2.0 * k * (found.u * (self.along @ found.u)
                        + found.w * (line.v_mu @ found.w)).sum(axis=0)
-            + 2.0 * (found.u * (self._coupling @ found.w)).sum(axis=0))
+            + 2.0 * (found.u * (self.coupling @ found.w)).sum(axis=0))
         inward = np.where(np.abs(k.imag) < _TRAVELS * np.abs(k.real), change.real < 0.0,
                           k.imag > 0.0)
         sign = np.where(inward, -1.0, 1.0)
