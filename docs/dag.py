@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'rotorsoil_ros'
-TOP = ['cli', 'testing', 'node', 'screen', 'figures', 'bags', 'wire', 'monitor', 'case',
+TOP = ['cli', 'testing', 'node', 'screen', 'figures', 'bags', 'feeds', 'wire', 'monitor', 'case',
        'machine', 'rotor', 'ground', 'base']
 # Column and row of each wing, and what it is for.
 PLACES = {
@@ -22,6 +22,7 @@ PLACES = {
     'monitor': (1, 3, 'speed and vectors in, events out'),
     'wire': (0, 2.2, 'events to bytes of messages'),
     'bags': (0, 1.2, 'MCAP in and out'),
+    'feeds': (0, 0.2, 'control rooms, other halls'),
     'figures': (1, 1.2, 'pictures, pages on paper'),
     'screen': (2, 1.2, 'recording, live view'),
     'node': (1, 0.2, 'the ROS graph'),

@@ -20,7 +20,8 @@ BASE = 'base'
 DAG = {
     BASE: set(), 'ground': {BASE}, 'rotor': {BASE}, 'machine': {'ground', 'rotor'},
     'case': {'machine'}, 'monitor': {'case'}, 'wire': {'monitor'}, 'bags': {'wire'},
-    'figures': {'monitor'}, 'screen': {'monitor'}, 'node': {'bags', 'figures', 'screen'},
+    'figures': {'monitor'}, 'screen': {'monitor'}, 'feeds': {'wire'},
+    'node': {'bags', 'feeds', 'figures', 'screen'},
     'cli': {'node'}, 'testing': {'node'},
 }
 # The package itself: its names are looked up when somebody asks, so that it may name every wing.
@@ -32,6 +33,7 @@ OWNERS = {
     'matplotlib': {'figures'}, 'pandas': {BASE}, 'xarray': {BASE}, 'pydantic': {'case', 'bags'},
     'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags'}, 'rosbags': {'bags'},
     'pyarrow': {'bags', 'screen'},  # rerun itself needs it
+    'asyncua': {'feeds'}, 'cryptography': {'feeds'}, 'google': {'feeds'}, 'paho': {'feeds'},
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},
 }
 LONGEST_ROOM, SHORTEST_ROOM = 400, 60

@@ -18,10 +18,12 @@ import setuptools
 import yaml
 
 import rotorsoil_ros
+from rotorsoil_ros.cli.arguments.parser import parse
 from rotorsoil_ros.errors import BAD_INPUT
 
 ROOT = Path(__file__).parents[1]
 CASES = sorted((ROOT / 'config').glob('*.yaml'))
+UNITS = sorted((ROOT / 'launch').glob('*.service'))
 LIBRARY = sorted((ROOT / 'config' / 'library').glob('*.yaml'))
 
 # What pip installs, and what package.xml calls it. The wheels of ROS stand for several packages.
@@ -96,8 +98,8 @@ def test_data_files_exist_and_hold_every_case(arguments):
         path.name for path in CASES]
     assert [Path(name).name for name in installed['share/rotorsoil_ros/config/library']] == [
         path.name for path in LIBRARY]
-    assert [Path(name).suffix for name in installed['share/rotorsoil_ros/launch']] == [
-        '.py', '.service', '.yaml']
+    assert {Path(name).name for name in installed['share/rotorsoil_ros/launch']} == {
+        'rotorsoil.launch.py', 'rotorsoil.yaml', *(path.name for path in UNITS)}
     for sources in installed.values():
         assert all((ROOT / source).is_file() for source in sources)
 
@@ -256,13 +258,16 @@ def test_changelog_is_one_for_this_package():
     assert len(lines[0]) == len(lines[2]) == len(lines[1])
 
 
-def test_systemd_unit_starts_what_is_installed_and_knows_its_exit_status(arguments):
+@pytest.mark.parametrize('path', UNITS, ids=lambda path: path.stem)
+def test_systemd_unit_starts_what_is_installed_and_knows_its_exit_status(arguments, path):
     unit = configparser.ConfigParser(interpolation=None)
     unit.optionxform = str
-    unit.read('launch/rotorsoil.service')
+    unit.read(path)
     service = unit['Service']
-    program = Path(service['ExecStart'].split()[0]).name
+    program, *given = service['ExecStart'].split()
     scripts = [entry.split(' = ')[0] for entry in arguments['entry_points']['console_scripts']]
-    assert program in scripts
+    assert Path(program).name in scripts
+    if Path(program).name == 'rotorsoil':
+        assert parse(given).run.startswith('live.feed:')
     assert int(service['RestartPreventExitStatus']) == BAD_INPUT
     assert service['Restart'] == 'on-failure'

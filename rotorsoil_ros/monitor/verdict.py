@@ -54,29 +54,42 @@ class Account:
 
     def failures(self) -> list[str]:
         """Return what speaks against the machine, each in one line; first what its case says."""
+        return [*self._of_case, *(text for _, text in self._faults())]
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """Yield what was measured against the machine, and where."""
         rules = self.rules
-        found = [*self._of_case]
         if self.suspicion.is_of_unit:
-            return found  # amplitudes of another unit speak neither for the machine nor against
-        found += [f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the band, '
-                  f'{100 * rules.inside_share:.0f} % should'
-                  for channel, share in self.inside.items() if share < rules.inside_share]
-        found += [fault for peak in self.peaks
-                  if (fault := peak_fault(peak, margin=rules.critical_margin))]
-        found += [f'{entry.channel}: zone D, {MM * entry.velocity:.2f} mm/s rms measured at '
-                  f'{rad_s_to_rpm(entry.speed):.0f} rpm' for entry in self.worst_zones
-                  if entry.source == 'measured' and entry.zone == 'D' and entry.is_steady]
-        return found
+            return  # amplitudes of another unit speak neither for the machine nor against
+        for channel, share in self.inside.items():
+            if share < rules.inside_share:
+                yield channel, (f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the '
+                                f'band, {100 * rules.inside_share:.0f} % should')
+        for peak in self.peaks:
+            if fault := peak_fault(peak, margin=rules.critical_margin):
+                yield peak.channel, fault
+        for entry in self.worst_zones:
+            if entry.source == 'measured' and entry.zone == 'D' and entry.is_steady:
+                yield entry.channel, (
+                    f'{entry.channel}: zone D, {MM * entry.velocity:.2f} mm/s rms measured at '
+                    f'{rad_s_to_rpm(entry.speed):.0f} rpm')
 
     def verdict(self) -> Verdict:
         """Failing for any reason; undecided where nothing could be held against anything."""
-        if self.failures():
+        return self._word(bool(self.failures()), bool(self.inside) or any(
+            peak.is_complete and peak.is_slow for peak in self.peaks))
+
+    def verdicts(self) -> dict[str, Verdict]:
+        """Say the same of every channel that was measured."""
+        failing, inside = {channel for channel, _ in self._faults()}, self.inside
+        passed = {peak.channel for peak in self.peaks if peak.is_complete and peak.is_slow}
+        return {channel: self._word(channel in failing, channel in inside or channel in passed)
+                for channel in dict.fromkeys([*self.band.channels, *self.zones.measured])}
+
+    def _word(self, fails: bool, is_judged: bool) -> Verdict:
+        if fails:
             return Verdict.FAILS
-        if self.suspicion.said:
-            return Verdict.UNDECIDED
-        is_judged = bool(self.inside) or any(
-            peak.is_complete and peak.is_slow for peak in self.peaks)
-        return Verdict.PASSES if is_judged else Verdict.UNDECIDED
+        return Verdict.PASSES if is_judged and not self.suspicion.said else Verdict.UNDECIDED
 
 
 class Teller:
@@ -209,6 +222,9 @@ class Teller:
             found[f'{channel}_inside_band'] = band.recent(channel)
         for channel, share in band.of_run().items():
             found[f'{channel}_inside_band_of_run'] = share
+        found['verdict'] = self._account.verdict()
+        found |= {f'{name}_verdict': verdict
+                  for name, verdict in self._account.verdicts().items()}
         return found
 
 

@@ -166,7 +166,7 @@ class Watch:
         return Topics.named(
             {name: publisher.topic_name for name, publisher in zip(
                 OWN_TOPICS, self._own_publishers, strict=True)},
-            diagnostics=diagnostics.topic_name)
+            diagnostics=diagnostics.topic_name, node=self._node.get_fully_qualified_name())
 
     def _subscribe(self) -> None:
         for name, kind in MEASURED_TOPICS.items():

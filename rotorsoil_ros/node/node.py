@@ -3,10 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 import gc
-import signal
 import sys
 import traceback
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -35,6 +34,7 @@ from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
 from rotorsoil_ros.node.parameters import described, Settings
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
+from rotorsoil_ros.stop import Stop
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
 
@@ -218,7 +218,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         """Say on /diagnostics, and so in the log itself, how logging goes."""
         report = log.report(self._now_ns())
         if report is not None and self._diagnostics is not None and self._diagnostics.is_activated:
-            payload = diagnostic_array(report)
+            payload = diagnostic_array(report, node=self.get_fully_qualified_name().strip('/'))
             self._diagnostics.publish(payload)
             log.write(Records(
                 self._diagnostics.topic_name, DIAGNOSTICS, [report.stamp_ns], [payload]))
@@ -239,38 +239,6 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         """Tell what rclpy would swallow in a transition."""
         if isinstance(error, Exception):
             self.get_logger().error(''.join(traceback.format_exception(kind, error, trace)))
-
-
-class Stop:
-    """
-    A signal that asks the process to stop.
-
-    It is noted whenever it comes and interrupts only what may be interrupted, so that it can
-    tear nothing: neither an executor that is being built nor a log that is being finished.
-    """
-
-    def __init__(self) -> None:
-        self.requested = False
-        self._interrupts = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._take)
-
-    @contextmanager
-    def interrupting(self) -> Iterator[None]:
-        """Raise KeyboardInterrupt in this block if the signal comes, or has come before it."""
-        self._interrupts = True
-        try:
-            if self.requested:
-                raise KeyboardInterrupt
-            yield
-        finally:
-            self._interrupts = False
-
-    def _take(self, number: int, frame: FrameType | None) -> None:
-        del number, frame
-        self.requested = True
-        if self._interrupts:
-            raise KeyboardInterrupt
 
 
 class Survived:

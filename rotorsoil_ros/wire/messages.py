@@ -57,7 +57,12 @@ class Records(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """Full names of the topics on which one machine is answered."""
+    """
+    Full names of the topics on which one machine is answered, and of the node that answers.
+
+    All nodes share one topic of diagnostics: what they say there begins with the node's name, or
+    two halls that both have a fan would speak of the same one.
+    """
 
     amplitude: str
     phase: str
@@ -70,17 +75,20 @@ class Topics:
     events: str
     model: str
     diagnostics: str = DIAGNOSTICS_TOPIC
+    node: str = NODE_NAME
 
     @classmethod
     def of(cls, namespace: str, machine: str) -> 'Topics':
         """Name the topics as a node that nobody renamed does; namespace `` or `/plant`."""
-        own = f'{namespace}/{NODE_NAME}/{machine}'
-        return cls.named({name: f'{own}/{name}' for name in OWN_TOPICS})
+        node = f'{namespace}/{NODE_NAME}'
+        return cls.named({name: f'{node}/{machine}/{name}' for name in OWN_TOPICS}, node=node)
 
     @classmethod
-    def named(cls, topics: Mapping[str, str], *, diagnostics: str = DIAGNOSTICS_TOPIC) -> 'Topics':
-        """Take the full names of OWN_TOPICS, by their names below the machine's."""
-        return cls(diagnostics=diagnostics, **{
+    def named(
+        cls, topics: Mapping[str, str], *, diagnostics: str = DIAGNOSTICS_TOPIC, node: str,
+    ) -> 'Topics':
+        """Take the full names of OWN_TOPICS, by what follows the machine's, and of the node."""
+        return cls(diagnostics=diagnostics, node=node.strip('/'), **{
             name.replace('/', '_'): topic for name, topic in topics.items()})
 
 
@@ -179,10 +187,11 @@ class Encoder:
             case Demodulated():
                 yield from self._demodulated(event)
             case Remark():
-                yield Records(self._topics.events, LOG, [event.stamp_ns], [log_message(event)])
+                yield Records(self._topics.events, LOG, [event.stamp_ns],
+                              [log_message(event, node=self._topics.node)])
             case Diagnostics():
                 yield Records(self._topics.diagnostics, DIAGNOSTICS, [event.stamp_ns],
-                              [diagnostic_array(event)])
+                              [diagnostic_array(event, node=self._topics.node)])
             case Model(stamp_ns=stamp_ns):
                 payload = encode(STRING, {'data': json.dumps(event.description)})
                 yield Records(self._topics.model, STRING, [stamp_ns], [payload], latched=True)
@@ -231,18 +240,18 @@ class Encoder:
         return Records(topic, JOINT_STATE, stamps, writer.write_parts(stamps, outer, velocity))
 
 
-def log_message(event: Remark) -> bytes:
+def log_message(event: Remark, *, node: str = NODE_NAME) -> bytes:
     """Return a remark as the message of every ROS log."""
     return encode(LOG, {
         'stamp': _time(event.stamp_ns), 'level': SEVERITY[event.level],
-        'name': f'{NODE_NAME}.{event.machine}', 'msg': event.text})
+        'name': f'{node.replace("/", ".")}.{event.machine}', 'msg': event.text})
 
 
-def diagnostic_array(event: Diagnostics) -> bytes:
+def diagnostic_array(event: Diagnostics, *, node: str = NODE_NAME) -> bytes:
     """Return the health of a machine as the message that every ROS monitor reads."""
     return encode(DIAGNOSTICS, {
         'header': {'stamp': _time(event.stamp_ns)},
-        'status': [_status(each) for each in (event, *event.parts)]})
+        'status': [_status(each, node) for each in (event, *event.parts)]})
 
 
 def _time(stamp_ns: int) -> dict[str, int]:
@@ -250,9 +259,9 @@ def _time(stamp_ns: int) -> dict[str, int]:
     return {'sec': sec, 'nanosec': nanosec}
 
 
-def _status(event: Diagnostics) -> dict[str, object]:
+def _status(event: Diagnostics, node: str) -> dict[str, object]:
     return {
-        'level': event.level, 'name': f'{NODE_NAME}: {event.machine} {event.name}'.rstrip(),
+        'level': event.level, 'name': f'{node}: {event.machine} {event.name}'.rstrip(),
         'message': event.summary, 'hardware_id': event.machine,
         'values': [{'key': key, 'value': decimal(value)} for key, value in event.values.items()]}
 

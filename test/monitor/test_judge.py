@@ -395,6 +395,9 @@ def test_level_is_that_of_the_zone(zoned, velocity, level):
     assert told.values[f'{X}_measured_mm_s_rms'] == pytest.approx(1e3 * velocity)
     assert zoned.of(Zoned)[-1].measured[X] == zone(velocity, LIMITS.rigid)
     assert zoned.of(Zoned)[-1].predicted[Z] in 'ABCD'
+    # Zone D speaks against a machine; without a band nothing else is held against anything.
+    verdict = 'fails' if level is Level.ERROR else 'undecided'
+    assert told.values['verdict'] == told.values[f'{X}_verdict'] == verdict
 
 
 @pytest.mark.parametrize('velocity, level, said', [

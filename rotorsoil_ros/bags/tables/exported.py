@@ -18,7 +18,7 @@ from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE
 from rotorsoil_ros.wire.handlers import SPEED_TOPICS
-from rotorsoil_ros.wire.messages import NODE_NAME, OWN_TOPICS, Records
+from rotorsoil_ros.wire.messages import OWN_TOPICS, Records
 from rotorsoil_ros.wire.sensors import JointStateReader
 from rotorsoil_ros.wire.speeds import SpeedReader, USUAL
 
@@ -229,7 +229,7 @@ class _Tables:
         for path, (text,) in texts.items():
             if path.endswith('.key') and text.endswith('_zone'):
                 status = path.split('.')[0]
-                name = texts[f'{status}.name'][0].removeprefix(f'{NODE_NAME}: ').split(' ')[0]
+                name = texts[f'{status}.hardware_id'][0]
                 if name in self._machines:
                     self._machines[name].zones[text] = texts[
                         f'{path.removesuffix(".key")}.value'][0]

@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import rotorsoil_ros
+from rotorsoil_ros.cli.arguments.feeds import add_feeds
 from rotorsoil_ros.cli.arguments.options import (
     add_output,
     add_speed,
@@ -45,6 +46,7 @@ def parser() -> argparse.ArgumentParser:
     _add_case_verbs(verbs)
     _add_import_verbs(verbs)
     _add_live_verbs(verbs)
+    add_feeds(verbs)
     completion = add_verb(verbs, 'completion', 'arguments.completion:completion',
                        'print what lets a shell complete verbs and options', case=False)
     completion.add_argument('shell', choices=('bash', 'zsh', 'fish'))

@@ -1,0 +1,1 @@
+"""Verbs that live as long as the node does."""

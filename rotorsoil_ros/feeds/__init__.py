@@ -1,0 +1,1 @@
+"""What the node answers, for those who do not speak ROS: control rooms and other halls."""
