@@ -11,6 +11,7 @@ from rotorsoil_ros.errors import RotorSoilError
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
+AnyArray: TypeAlias = npt.NDArray[np.inexact[Any]]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 Numbers: TypeAlias = float | Sequence[float] | FloatArray

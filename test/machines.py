@@ -13,7 +13,8 @@ from rotorsoil_ros.ground.soil import Rectangle, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.assembly import Rotor
-from rotorsoil_ros.rotor.bearing import Bearing, Pedestal, SpeedTable
+from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
+from rotorsoil_ros.rotor.coefficients import SpeedTable
 from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
 

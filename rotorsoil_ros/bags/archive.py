@@ -244,7 +244,8 @@ class Book:
     def begin(self, monitor: Monitor) -> None:
         """Listen to a monitor from its first message on."""
         self._monitor = monitor
-        self._minutes = Minutes(monitor.machine, monitor.table.channels)
+        self._minutes = Minutes(monitor.machine, monitor.table.channels,
+                                monitor.table.stability)
         monitor.judge.account.zones.listener = self._minutes.take_zone
 
     def __call__(self, event: Event) -> None:

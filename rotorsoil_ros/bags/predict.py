@@ -1,7 +1,7 @@
 """What would the node have answered to a recorded profile? The same numbers, without a graph."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 import math
@@ -15,6 +15,7 @@ from rotorsoil_ros.bags.feed import feed, Inputs
 from rotorsoil_ros.bags.metadata import files
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Event, Predicted
@@ -98,7 +99,7 @@ class Answered:
     counts : Counter
         How many speeds for which reason.
     remarks : tuple of str
-        What of the profile could not be read, and why.
+        What of the profile could not be read or answered, and why.
     failure : str
         Why not one speed is answered; nothing where one is.
     largest : Largest or None
@@ -204,7 +205,8 @@ def predict(
         failure = _why_nothing(monitor.health)
         if not failure:
             log.keep()
-    return Answered(name, monitor.health.counts, tuple(inputs.remarks), failure, largest,
+    remarks = [*inputs.remarks, *_grown(monitor)]
+    return Answered(name, monitor.health.counts, tuple(remarks), failure, largest,
                     dict(zip(ACROSS, expected.natural_speeds, strict=True)))
 
 
@@ -234,6 +236,13 @@ class _Answers:
         if self._file is not None and self._partial is not None and self._out is not None:
             self._file.close()
             os.replace(self._partial, self._out)
+
+
+def _grown(monitor: Monitor) -> Iterator[str]:
+    """Yield why speeds have no answer at which the machine is unstable."""
+    if monitor.health.counts['unstable']:
+        for line in unstable(monitor.table.stability):
+            yield f'{monitor.health.counts["unstable"]} speeds are not answered: {line}'
 
 
 def _why_nothing(health: Health) -> str:

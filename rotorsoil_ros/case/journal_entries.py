@@ -14,8 +14,8 @@ from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.entries.bearing import JournalEntry, ViscosityTable
+from rotorsoil_ros.case.entries.coefficients import require_speeds
 from rotorsoil_ros.case.entries.entry import Place
-from rotorsoil_ros.case.rotor_entries import require_speeds
 from rotorsoil_ros.errors import require, RotorSoilError, solved
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing
@@ -108,8 +108,8 @@ class BearingStates:
     ----------
     name : str
         Of the bearing.
-    stiffness, damping : (n, 2, 2) float arrays
-        Over (x, z), force first [N/m], [N s/m].
+    stiffness, damping, inertia : (n, 2, 2) float arrays
+        To vibration of the speed's own frequency, over (x, z), force first [N/m], [N s/m], [kg].
     film : JournalStates or None
         Of a journal.
 
@@ -118,6 +118,7 @@ class BearingStates:
     name: str
     stiffness: FloatArray
     damping: FloatArray
+    inertia: FloatArray
     film: JournalStates | None
 
 
@@ -127,8 +128,8 @@ def bearing_states(
     """Return every bearing at speeds (n,) [rad/s]: films are solved, tables are looked up."""
     films = {journal.name: journal.at(speed) for journal in journals}
     return tuple(BearingStates(
-        bearing.name, *((film.stiffness, film.damping) if film is not None
-                        else bearing.coefficients(speed)), film)
+        bearing.name, *(bearing.coefficients(speed, speed) if film is None else (
+            film.stiffness, film.damping, np.zeros_like(film.damping))), film)
         for bearing in rotor.bearings for film in [films.get(bearing.name)])
 
 

@@ -8,7 +8,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
-from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.rotor.coefficients import values
 from rotorsoil_ros.rotor.shaft import Material
 
 # What such a thing ever has, the unit, and by which factors a slip of the unit is off, the
@@ -112,9 +112,8 @@ def _of_bearings(case: Case) -> Iterator[str]:
         if bearing.name in films:
             yield from _of_film(f'rotor.bearings.{index}.journal', films[bearing.name])
             continue
-        given = bearing.stiffness
-        values = given.values.max(axis=0) if isinstance(given, SpeedTable) else given
-        for axis, value in zip(('xx', 'zz'), np.diagonal(values).tolist(), strict=True):
+        most = values(bearing.stiffness).reshape(-1, 2, 2).max(axis=0)
+        for axis, value in zip(('xx', 'zz'), np.diagonal(most).tolist(), strict=True):
             # None at all is a damper or a seal.
             if value > 0.0:
                 yield from asked(f'rotor.bearings.{index}.stiffness.{axis}', value, _STIFFNESS)

@@ -1,34 +1,32 @@
 """Which rotor the entries of a case file describe."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 import math
+from typing import Any
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.case_errors import Faults
-from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.case.entries.bearing import (
-    BearingEntry,
-    Damping,
-    DampingTable,
-    MassPerAxis,
-    PedestalEntry,
-    Stiffness,
-    StiffnessTable,
-)
+from rotorsoil_ros.case.entries.bearing import BearingEntry, MassPerAxis, PedestalEntry
+from rotorsoil_ros.case.entries.coefficients import coefficients, constant
 from rotorsoil_ros.case.entries.entry import Place
+from rotorsoil_ros.case.entries.shaft import MaterialEntry, Section
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.rotor.assembly import Rotor
-from rotorsoil_ros.rotor.bearing import Bearing, Pedestal, SpeedTable
+from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
 from rotorsoil_ros.rotor.disc import Disc, permissible_unbalance
-from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftSection
+from rotorsoil_ros.rotor.shaft import Material, Probe, ShaftDamping, ShaftSection
 from rotorsoil_ros.units import rpm_to_rad_s
 
 _INERTIAS, _DIMENSIONS = schema.DiscEntry.ways
+
+# Which attribute of a ShaftDamping each key is, and its unit.
+_DAMPINGS = {
+    'internal_damping': {'viscous': ('viscous', 's'), 'loss_factor': ('loss_factor', '-')},
+    'external_damping': {'mass': ('fixed_mass', '1/s'), 'stiffness': ('fixed_stiffness', 's')}}
 
 # More than anybody could solve.
 _MOST_SHAFT_NODES = 2000
@@ -66,31 +64,53 @@ class RotorEntries:
     ) -> Rotor:
         entries = self.faults.entries.rotor
         probes = tuple(Probe(entry.name, entry.position) for entry in entries.probes)
+        external = entries.external_damping
         with self.faults.at('rotor', entry=entries):
             return Rotor(shaft_height=entries.shaft_height, shaft=shaft, discs=discs,
-                         bearings=bearings, probes=probes)
+                         bearings=bearings, probes=probes,
+                         drag=0.0 if external is None else external.mass)
 
-    def _section(self, index: int, entry: schema.Section) -> ShaftSection:
+    def _section(self, index: int, entry: Section) -> ShaftSection:
         place = ('rotor', 'shaft', index)
-        material = self._material(place, entry)
+        material, damping = self._material(place, entry), self._damping(place, entry)
+        common = self.faults.entries.rotor
+        loads = {key: own if own is not None else getattr(common, key) or 0.0
+                 for key in ('axial_force', 'torque') for own in [getattr(entry, key)]}
         with self.faults.at(*place, entry=entry):
             return ShaftSection(
                 length=entry.length, elements=entry.elements, material=material,
                 outer_diameter=_ends(entry.outer_diameter, entry.outer_diameter_end),
                 inner_diameter=_ends(entry.inner_diameter, entry.inner_diameter_end),
-                **({} if entry.added_mass is None else {'added_mass': entry.added_mass}))
+                added_mass=entry.added_mass or 0.0, damping=damping, **loads)
 
-    def _material(self, section: Place, entry: schema.Section) -> Material:
+    def _material(self, section: Place, entry: Section) -> Material:
         own, common = entry.material, self.faults.entries.rotor.material
         place = ('rotor', 'material') if own is None else (*section, 'material')
         chosen = common if own is None else own
         if chosen is None:
             raise self.faults.error(*place, problem='is missing, and so is that of '
                                                     + '.'.join(map(str, section)))
-        if not isinstance(chosen, schema.MaterialEntry):
+        if not isinstance(chosen, MaterialEntry):
             return library.material(chosen)
         with self.faults.at(*place, entry=chosen):
             return Material(**dict(chosen))
+
+    def _damping(self, section: Place, entry: Section) -> ShaftDamping:
+        """Return what a section loses: as it says itself, else as the rotor does."""
+        common: schema.RotorEntry = self.faults.entries.rotor
+        given: dict[str, float] = {}
+        for key, names in _DAMPINGS.items():
+            own = getattr(entry, key)
+            chosen = getattr(common, key) if own is None else own
+            if chosen is None:
+                continue
+            place = ('rotor', key) if own is None else (*section, key)
+            with self.faults.at(*place, entry=chosen):
+                for part, (name, unit) in names.items():
+                    given[name] = getattr(chosen, part)
+                    require(given[name] >= 0.0, part, f'>= 0 {unit}', given[name])
+                ShaftDamping(**given)  # says what else is wrong at its own key
+        return ShaftDamping(**given)
 
     def _disc(self, index: int, entry: schema.DiscEntry) -> Disc:
         place = ('rotor', 'discs', index)
@@ -114,33 +134,31 @@ class RotorEntries:
     def _bearing(self, index: int, entry: BearingEntry) -> Bearing:
         place = ('rotor', 'bearings', index)
         foundation = self._foundation_of(place, entry)
-        stiffness, damping = self._coefficients(place, entry)
+        matrices = self._coefficients(place, entry)
         pedestal = None
         if entry.pedestal is not None:
             pedestal = self._pedestal((*place, 'pedestal'), entry.pedestal)
         with self.faults.at(*place, entry=entry):
             return Bearing(name=entry.name, position=entry.position, foundation=foundation,
-                           stiffness=stiffness, damping=damping, pedestal=pedestal)
+                           pedestal=pedestal, **matrices)
 
-    def _coefficients(
-        self, place: Place, entry: BearingEntry,
-    ) -> tuple[FloatArray | SpeedTable, FloatArray | SpeedTable]:
-        given = {key: value for key, value in (('stiffness', entry.stiffness),
-                                               ('damping', entry.damping)) if value is not None}
+    def _coefficients(self, place: Place, entry: BearingEntry) -> dict[str, Any]:
+        given = {key: value for key in ('stiffness', 'damping', 'inertia')
+                 if (value := getattr(entry, key)) is not None}
         if entry.journal is not None:
             if given:
                 raise self.faults.error(*place, problem='needs either journal or stiffness and '
                                                         f'damping, got journal and {min(given)}')
             # What a film is follows from what it carries, and that from the rotor.
-            return np.eye(2), np.zeros((2, 2))
+            return {'stiffness': np.eye(2), 'damping': np.zeros((2, 2))}
         if entry.load is not None:
             raise self.faults.error(*place, 'load', problem='belongs to a journal, which is '
                                                             'missing')
-        if entry.stiffness is None or entry.damping is None:
-            missing = 'stiffness' if entry.stiffness is None else 'damping'
-            raise self.faults.error(*place, missing, problem='is missing')
-        return (self._matrix((*place, 'stiffness'), entry.stiffness),
-                self._matrix((*place, 'damping'), entry.damping))
+        for missing in ('stiffness', 'damping'):
+            if missing not in given:
+                raise self.faults.error(*place, missing, problem='is missing')
+        return {key: coefficients(self.faults, (*place, key), value)
+                for key, value in given.items()}
 
     def _foundation_of(self, place: Place, entry: BearingEntry) -> str | None:
         blocks = self.faults.entries.foundations
@@ -156,53 +174,18 @@ class RotorEntries:
                 f'is missing; there are several: {", ".join(names)}'))
         return blocks[0].name
 
-    def _matrix(
-        self, place: Place,
-        entry: Stiffness | Damping | StiffnessTable | DampingTable,
-    ) -> FloatArray | SpeedTable:
-        if not isinstance(entry, (StiffnessTable, DampingTable)):
-            return _constant(entry)
-        count = len(entry.speed_rpm)
-        values = np.zeros((count, 2, 2))
-        for i, j, key in ((0, 0, 'xx'), (0, 1, 'xz'), (1, 0, 'zx'), (1, 1, 'zz')):
-            column = getattr(entry, key)
-            if column is not None and len(column) != count:
-                raise self.faults.error(
-                    *place, key, problem=f'must have as many entries as speed_rpm, {count}, '
-                                         f'got {len(column)}')
-            values[:, i, j] = 0.0 if column is None else column
-        require_speeds(self.faults, (*place, 'speed_rpm'), entry.speed_rpm)
-        return SpeedTable(rpm_to_rad_s(np.array(entry.speed_rpm)), values)
-
     def _pedestal(self, place: Place, entry: PedestalEntry) -> Pedestal:
         mass = entry.mass
         masses = (mass.xx, mass.zz) if isinstance(mass, MassPerAxis) else (mass, mass)
         with self.faults.at(*place, entry=entry):
             for value in masses:
                 require(0.0 <= value < math.inf, 'mass', '>= 0 kg and finite', value)
-            return Pedestal(mass=np.diag(masses), stiffness=_constant(entry.stiffness),
-                            damping=_constant(entry.damping))
-
-
-def require_speeds(faults: Faults, place: Place, speed_rpm: list[float]) -> None:
-    """Refuse speeds that do not rise, or leave a part of the speed range unknown."""
-    rises = all(left < right for left, right in pairwise(speed_rpm))
-    if not (len(speed_rpm) >= 2 and rises and speed_rpm[0] >= 0.0):
-        raise faults.error(*place, problem='must be two or more rising speeds >= 0 rpm, '
-                                                f'got {shown(speed_rpm)}')
-    low, high = faults.entries.speed_range_rpm
-    if low < high and not (speed_rpm[0] <= low and high <= speed_rpm[-1]):
-        raise faults.error(
-            *place, problem=f'must cover speed_range_rpm, {low:g} to {high:g} rpm, '
-                            f'got {speed_rpm[0]:g} to {speed_rpm[-1]:g}')
+            return Pedestal(mass=np.diag(masses), stiffness=constant(entry.stiffness),
+                            damping=constant(entry.damping))
 
 
 def _ends(left: float, right: float | None) -> tuple[float, float]:
     return left, left if right is None else right
-
-
-def _constant(entry: Stiffness | Damping) -> FloatArray:
-    return np.array([[entry.xx, entry.xz], [entry.zx, entry.zz]])
 
 
 @dataclass(frozen=True)

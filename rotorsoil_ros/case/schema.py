@@ -5,7 +5,8 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import Discriminator, Field, StrictBool, StringConstraints, Tag
 
 from rotorsoil_ros.case.entries.bearing import BearingEntry
-from rotorsoil_ros.case.entries.entry import Entry, EVEN, KEYS, LAYERED, WORD
+from rotorsoil_ros.case.entries.entry import Entry, EVEN, given_or_named, KEYS, LAYERED, WORD
+from rotorsoil_ros.case.entries.shaft import AnyMaterial, Loaded, Section
 from rotorsoil_ros.case.quantities import (
     BalanceGrade,
     Celsius,
@@ -15,7 +16,6 @@ from rotorsoil_ros.case.quantities import (
     Kilogram,
     KilogramMetre,
     KilogramPerCubicMetre,
-    KilogramPerMetre,
     KilogramSquareMetre,
     Metre,
     MetreOrEndless,
@@ -42,10 +42,6 @@ class SoilEntry(Entry):
     loss_factor: Ratio
 
 
-def _given_or_named(value: object) -> str:
-    return WORD if isinstance(value, str) else KEYS
-
-
 class LayerEntry(SoilEntry):
     """Layer of the ground."""
 
@@ -58,7 +54,7 @@ class LayersEntry(Entry):
     layers: list[LayerEntry]
     below: Annotated[
         Annotated[SoilEntry, Tag(KEYS)] | Annotated[Literal['rock'], Tag(WORD)],
-        Discriminator(_given_or_named)]
+        Discriminator(given_or_named)]
 
 
 def _in_layers(value: object) -> str:
@@ -112,33 +108,6 @@ class FoundationEntry(Entry):
     stiffness_file: FileName | None = None
 
 
-class MaterialEntry(Entry):
-    """Shaft material."""
-
-    young_modulus: Pascal
-    poisson_ratio: Ratio
-    density: KilogramPerCubicMetre
-
-
-AnyMaterial: TypeAlias = Annotated[
-    Annotated[MaterialEntry, Tag(KEYS)]
-    | Annotated[Literal['steel', 'stainless_steel', 'cast_iron', 'aluminium'], Tag(WORD)],
-    Discriminator(_given_or_named)]
-
-
-class Section(Entry):
-    """Piece of shaft; a diameter at the right end makes it conical."""
-
-    length: Metre
-    outer_diameter: Metre
-    outer_diameter_end: Metre | None = None
-    inner_diameter: Metre = 0.0
-    inner_diameter_end: Metre | None = None
-    elements: Count
-    material: AnyMaterial | None = None
-    added_mass: KilogramPerMetre | None = None
-
-
 class DiscEntry(Entry):
     """Rigid disc, by its mass and inertias or by its dimensions."""
 
@@ -162,7 +131,7 @@ class ProbeEntry(Entry):
     position: Metre
 
 
-class RotorEntry(Entry):
+class RotorEntry(Loaded):
     """What turns."""
 
     shaft_height: Metre

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.ground import (
     band_contents,
@@ -32,7 +31,7 @@ from rotorsoil_ros.ground.soil import (
 )
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
-from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.rotor.coefficients import Coefficients, values as values_of
 from rotorsoil_ros.units import GRAVITY, rad_s_to_hz, rad_s_to_rpm
 
 # Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
@@ -248,13 +247,13 @@ def _of_bearings(case: Case) -> Iterator[str]:
                            + ('it feeds vibration' if name == 'damping' else 'it pushes away'))
 
 
-def _least(matrix: FloatArray | SpeedTable) -> float:
+def _least(matrix: Coefficients) -> float:
     """Return the smallest eigenvalue of the symmetric part, over all points of a table."""
-    values = matrix.values if isinstance(matrix, SpeedTable) else matrix
-    symmetric = 0.5 * (values + values.swapaxes(-2, -1))
+    given = values_of(matrix)
+    symmetric = 0.5 * (given + given.swapaxes(-2, -1))
     least = float(np.linalg.eigvalsh(symmetric).min())
     # Round-off of a matrix that is just not negative is none.
-    return least if least < -1e-12 * float(np.abs(values).max()) else 0.0
+    return least if least < -1e-12 * float(np.abs(given).max()) else 0.0
 
 
 def unstable(found: Stability) -> Iterator[str]:

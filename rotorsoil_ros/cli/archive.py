@@ -48,7 +48,7 @@ def predict_archive(arguments: Namespace, machine: 'Machine', speed: 'SpeedSourc
     failed = sum(bool(record.failure) for record in records)
     print(f'{len(records) - failed} of {len(records)} bags answered'
           + (f'; statistics: {arguments.statistics}' if arguments.statistics else ''))
-    return 1 if failed else 0
+    return 1 if failed or any(record.counts.get('unstable') for record in records) else 0
 
 
 def _place(arguments: Namespace) -> Path:

@@ -62,7 +62,7 @@ def predict(arguments: Namespace) -> int:
     print(f'{arguments.output}: {answered.machine}: {told}')
     for line in _found(answered, machine.case.zones, Units(arguments.units != SI)):
         print(line)
-    return 0
+    return 1 if answered.counts['unstable'] else 0
 
 
 def _found(answered: 'Answered', zones: ZoneLimits, units: Units) -> Iterator[str]:

@@ -217,7 +217,7 @@ def _criticals(
     """Return every critical speed to which the speed range has to keep a margin, and doubts."""
     low, high = case.speed_range
     wanted = low, asked(high)[1]
-    span = model.within_tables(wanted)
+    span = model.bearings.within_tables(wanted)
     names, lines = ModeNames(model), []
     found = critical_speeds(model, span)
     criticals = [one for one in found if abs(one.damping_ratio) <= LARGEST_DAMPING_RATIO]

@@ -124,19 +124,19 @@ def _told(machine: Machine, speed: FloatArray, highest_rpm: float) -> int:
 
 
 def bearings(arguments: Namespace) -> int:
-    """Write stiffness and damping of every bearing, and where each journal floats."""
+    """Write stiffness, damping and inertia of every bearing, and where each journal floats."""
     machine, speed = machine_of(arguments), values(arguments.rpm)
     plant = units_of(arguments) == PLANT
     found = machine.bearings(rpm=speed)
     keys = speed if plant else rpm_to_rad_s(speed)
-    matrices = [f'{name}_{pair}' for name in ('stiffness', 'damping')
-                for pair in ('xx', 'xz', 'zx', 'zz')]
+    kinds = ['stiffness', 'damping'] + ['inertia'] * any(one.inertia.any() for one in found)
+    matrices = [f'{kind}_{pair}' for kind in kinds for pair in ('xx', 'xz', 'zx', 'zz')]
     header = ['speed_rpm' if plant else 'speed_rad_s', 'bearing', 'load', 'sommerfeld',
               'eccentricity', 'attitude_deg' if plant else 'attitude',
               'least_film_um' if plant else 'least_film', *matrices]
     write_table(arguments.output, header, (
-        [key, one.name, *_film(one.film, row, plant=plant), *one.stiffness[row].ravel().tolist(),
-         *one.damping[row].ravel().tolist()]
+        [key, one.name, *_film(one.film, row, plant=plant),
+         *(value for kind in kinds for value in getattr(one, kind)[row].ravel().tolist())]
         for row, key in enumerate(keys.tolist()) for one in found))
     return 0
 

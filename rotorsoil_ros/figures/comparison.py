@@ -115,7 +115,8 @@ def _draw_prediction(
 
 
 def _draw_band(amplitude: Axes, phase: Axes, points: ChannelPoints) -> None:
-    given = np.flatnonzero(np.isfinite(points.low))
+    # Where the machine is unstable there is no answer, but a band of those that are not.
+    given = np.flatnonzero(np.isfinite(points.low) & np.isfinite(points.predicted))
     if not len(given):
         return
     given = given[np.argsort(points.speed[given], kind='stable')]

@@ -32,7 +32,7 @@ def damping_figure(case: Case, model: CoupledModel) -> Figure:
     splitter = DampingSplitter(model)
     speed = np.linspace(*case.speed_range, _SPEEDS)[1:]
     forced = splitter.forced(speed, case.unbalance)
-    criticals = critical_speeds(model, model.within_tables(case.speed_range))
+    criticals = critical_speeds(model, model.bearings.within_tables(case.speed_range))
     modes = [(critical, split) for critical, split in zip(
         criticals, splitter.of_modes(criticals), strict=True) if split is not None][:_MOST_MODES]
     figure = Figure(figsize=(8.0, 7.0), layout='constrained')

@@ -25,7 +25,7 @@ def transmissibility_figure(case: Case, model: CoupledModel) -> Figure:
     does to the housings hardly depends on that.
     """
     low, high = model.support.known(case.speed_range[1])
-    speed = model.within_tables(case.speed_range)[1]
+    speed = model.bearings.within_tables(case.speed_range)[1]
     omega = np.linspace(max(low, high / _POINTS), high, _POINTS)
     found = Transmissibility.of(model, omega, speed=speed)
     figure = Figure(figsize=(7.5, 6.5), layout='constrained')

@@ -9,8 +9,9 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel, DOFS
-from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, require, RotorSoilError
+from rotorsoil_ros.errors import NotSolvedError, require, RotorSoilError
 from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.machine.bearings import Bearings
 from rotorsoil_ros.machine.coupling import Answer, answer
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
@@ -18,7 +19,6 @@ from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.prediction import Prediction, Response
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.whirl import WhirlModes
-from rotorsoil_ros.units import rad_s_to_rpm
 
 # An unbalance at phase zero points up at t = 0 and moves toward +x: its force over (x, z),
 # per moment and squared speed (Lalanne & Ferraris, sec. 1.2.5).
@@ -121,6 +121,11 @@ class CoupledModel:
                 *(f'{name}_couple' for name in self.couples))
 
     @cached_property
+    def bearings(self) -> Bearings:
+        """All that holds the shaft."""
+        return Bearings(self.rotor.bearings)
+
+    @cached_property
     def nominal_springs(self) -> FloatArray:
         """Isotropic stiffness that stands in for each bearing in the rotor's modes [N/m]."""
         own = [bearing.nominal_stiffness for bearing in self.rotor.bearings]
@@ -131,6 +136,7 @@ class CoupledModel:
 
     @cached_property
     def ports(self) -> list[int]:
+        """Rows of the rotor's plane matrices at stations, then at discs with couples."""
         rotor = self.rotor
         places = {disc.name: 2 * rotor.node_of(disc.position) for disc in rotor.discs}
         return [*(2 * rotor.node_of(station.position) for station in rotor.stations),
@@ -206,8 +212,9 @@ class CoupledModel:
 
         """
         omega = np.asarray(omega, dtype=float)
-        return self._forced(self._modes_at(speed, omega), omega,
-                            np.full(len(omega), float(speed)), channel)
+        displacement, force = self._at(speed, omega, self._unit_load(channel))
+        return Response(self.channels, np.full(len(omega), float(speed)), omega,
+                        displacement[..., 0], force[..., 0])
 
     def harmonic_response(
         self, speed: FloatArray, *, order: float, channel: str,
@@ -228,11 +235,11 @@ class CoupledModel:
         require(0.0 < order < math.inf, 'order', '> 0 and finite', order)
         speed = np.asarray(speed, dtype=float)
         modes = WhirlModes.of(self.rotor, self.ports, springs=self.nominal_springs, order=order)
-        return self._forced(modes, order * speed, speed, channel)
+        displacement, force = self._respond(modes, order * speed, speed, self._unit_load(channel))
+        return Response(self.channels, speed, order * speed, displacement[..., 0], force[..., 0])
 
-    def _forced(
-        self, modes: WhirlModes, omega: FloatArray, speed: FloatArray, channel: str,
-    ) -> Response:
+    def _unit_load(self, channel: str) -> ComplexArray:
+        """Return a unit force at a channel, in the order of ports, housings and blocks."""
         led = [one for rotor in self.rotors if rotor is not self.rotor
                for one in rotor.channels if not one.is_housing]
         moving = self.channels[:len(self.channels) - self._on_ground]
@@ -241,8 +248,7 @@ class CoupledModel:
             raise RotorSoilError(f'force must act at one of {", ".join(loaded)}, got {channel}')
         load = np.zeros((len(self.channels), 1), dtype=complex)
         load[self.channels.index(channel)] = 1.0
-        displacement, force = self._respond(modes, omega, speed, self._sorted(load))
-        return Response(self.channels, speed, omega, displacement[..., 0], force[..., 0])
+        return self._sorted(load)
 
     def _sorted(self, loads: ComplexArray) -> ComplexArray:
         """Put loads on the channels, (c, k), into the order of ports, housings and blocks."""
@@ -280,12 +286,37 @@ class CoupledModel:
         """
         omega = np.asarray(omega, dtype=float)
         still = self._on_rotor(np.zeros((2 * len(self.ports), 3), dtype=complex))
-        return self._respond(self._modes_at(speed, omega), omega,
-                             np.full(len(omega), float(speed)), still, np.eye(3))
+        return self._at(speed, omega, still, np.eye(3))
 
-    def _modes_at(self, speed: float, omega: FloatArray) -> WhirlModes:
-        return WhirlModes.at(self.rotor, self.ports, springs=self.nominal_springs, speed=speed,
-                             highest=float(np.abs(omega).max(initial=0.0)))
+    def _at(
+        self, speed: float, omega: FloatArray, loads: ComplexArray, ground: FloatArray = _STILL,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Solve at a fixed speed, as `_respond`."""
+        highest, lags = float(np.abs(omega).max(initial=0.0)), self.lags(omega, speed)
+        displacement, force = self._unsolved(len(omega), loads.shape[1])
+        for lag in np.unique(lags).tolist():
+            rows = np.flatnonzero(lags == lag)
+            modes = WhirlModes.at(self.rotor, self.ports, springs=self.nominal_springs,
+                                  speed=speed, highest=highest, lag=lag)
+            displacement[rows], force[rows] = self._respond(
+                modes, omega[rows], np.full(len(rows), float(speed)), loads, ground)
+        return displacement, force
+
+    def lags(self, omega: FloatArray, speed: float) -> FloatArray:
+        """
+        Return the sign of excitation less rotor speed where it makes a difference, else 0, (n,).
+
+        What a hysteretic shaft exerts turns its own where the rotor overtakes the force.
+        """
+        losses = self.rotor.losses
+        if losses is None or not losses.is_hysteretic:
+            return np.zeros(len(omega))
+        return np.asarray(np.sign(omega - speed))
+
+    def _unsolved(self, count: int, columns: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return displacements and forces to be filled in; where none is transmitted, NaN."""
+        shape = (count, len(self.channels), columns)
+        return np.empty(shape, dtype=complex), np.full(shape, complex(np.nan, np.nan))
 
     def synchronous_response(
         self, speed: FloatArray, loads: ComplexArray,
@@ -322,9 +353,7 @@ class CoupledModel:
     ) -> tuple[ComplexArray, ComplexArray]:
         """Solve, some frequencies at a time, and sort by channel: (n, c, k) each."""
         np.empty(_KEPT, dtype=np.uint8)
-        shape = (len(omega), len(self.channels), loads.shape[1])
-        displacement = np.empty(shape, dtype=complex)
-        force = np.full(shape, complex(np.nan, np.nan))
+        displacement, force = self._unsolved(len(omega), loads.shape[1])
         for start in range(0, len(omega), _CHUNK):
             chunk = slice(start, start + _CHUNK)
             found = self._answer(modes, omega[chunk], speed[chunk], loads, ground)
@@ -340,7 +369,7 @@ class CoupledModel:
         """Solve at all these frequencies at once."""
         return answer(
             modes.receptance(omega), self.support.standing(omega), loads, ground=ground,
-            bearings=self.bearing_stiffness(omega, speed),
+            bearings=self.bearings.dynamic_stiffness(omega, speed),
             springs=np.repeat(self.nominal_springs, 2))
 
     def _arrange(self, found: Answer) -> tuple[ComplexArray, ComplexArray]:
@@ -361,40 +390,3 @@ class CoupledModel:
             first = own.stop
         return (np.concatenate([*displacement, found.blocks, found.ground], axis=1),
                 np.concatenate([*force, found.into_soil], axis=1))
-
-    def within_tables(self, span: tuple[float, float]) -> tuple[float, float]:
-        """
-        Return the part of a span of speeds [rad/s] that all tables of bearings hold.
-
-        Raises
-        ------
-        OutOfTableError
-            If they hold none of it.
-
-        """
-        ranges = [bearing.speed_range for bearing in self.rotor.bearings]
-        low = max([span[0], *(first for first, _ in ranges)])
-        high = min([span[1], *(last for _, last in ranges)])
-        if not low <= high:
-            raise OutOfTableError(
-                f'tables of bearings must hold some speed of {rad_s_to_rpm(span[0]):g} to '
-                f'{rad_s_to_rpm(span[1]):g} rpm, there is none that all of them hold')
-        return low, high
-
-    def bearing_coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return stiffness and damping of all bearings, (n, 2 b, 2 b) over (x, z) of each."""
-        bearings = self.rotor.bearings
-        # Without tables one row stands for all speeds, at no cost.
-        rows = speed if any(math.isfinite(one.speed_range[0]) for one in bearings) else speed[:1]
-        stiffness, damping = (np.zeros((len(rows), 2 * len(bearings), 2 * len(bearings)))
-                              for _ in range(2))
-        for index, bearing in enumerate(bearings):
-            pair = slice(2 * index, 2 * index + 2)
-            stiffness[:, pair, pair], damping[:, pair, pair] = bearing.coefficients(rows)
-        shape = (len(speed), *stiffness.shape[1:])
-        return np.broadcast_to(stiffness, shape), np.broadcast_to(damping, shape)
-
-    def bearing_stiffness(self, omega: FloatArray, speed: FloatArray) -> ComplexArray:
-        """Return the dynamic stiffness of all bearings, (n, 2 b, 2 b) over (x, z) of each."""
-        stiffness, damping = self.bearing_coefficients(speed)
-        return np.asarray(stiffness + (1j * omega)[:, None, None] * damping)

@@ -120,7 +120,6 @@ def driven(
     w = bearings - a * springs
     free = rotor.motion(loads)
     near = rotor.shapes[:, journals]
-    adjoint = rotor.shapes.conj().transpose(0, 2, 1)
     size = count + near.shape[2]
     # All that w multiplies at once: what the journals do by g, by the modes and by the loads.
     moves = np.concatenate([rotor.between(count // 2), -near, np.broadcast_to(
@@ -129,9 +128,9 @@ def driven(
     system = np.zeros((len(near), size, size), dtype=complex)
     system[:, :count] = forces[..., :size]
     system[:, :count, :count] += a
-    system[:, count:, :count] = adjoint[:, :, journals]
+    system[:, count:, :count] = rotor.driven[:, :, journals]
     system[:, range(count, size), range(count, size)] = rotor.stiffness
-    right = np.concatenate([forces[..., size:] - bearings @ moved, adjoint @ loads], axis=1)
+    right = np.concatenate([forces[..., size:] - bearings @ moved, rotor.driven @ loads], axis=1)
     try:
         solution = np.linalg.solve(system, right)
     except np.linalg.LinAlgError as error:

@@ -1,4 +1,4 @@
-"""Where the damping comes from: bearings, pedestals, material of the soil, radiation into it."""
+"""Where the damping comes from: bearings, pedestals, shaft, soil and radiation into it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,11 +12,16 @@ from rotorsoil_ros.ground.neighbours import without_loss
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.critical import CriticalSpeed
 from rotorsoil_ros.machine.support import Support
+from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
+from rotorsoil_ros.rotor.whirl import ORBITS
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
 BEARINGS, PEDESTALS, RADIATION, MATERIAL, SOIL = (
     'bearings', 'pedestals', 'radiation', 'soil material', 'soil')
-DAMPERS = (BEARINGS, PEDESTALS, RADIATION, MATERIAL, SOIL)
+# By the shaft: its material, what stands around it, and the torque, which may give.
+INTERNAL, EXTERNAL, TORQUE = 'shaft material', 'around the rotor', 'torque'
+_OF_SHAFT = (INTERNAL, EXTERNAL, TORQUE)
+DAMPERS = (BEARINGS, PEDESTALS, *_OF_SHAFT, RADIATION, MATERIAL, SOIL)
 
 # Above, a mode hardly swings before it is gone, and shares of its decay mean nothing.
 LARGEST_DAMPING_RATIO = 0.7
@@ -130,7 +135,15 @@ class DampingSplitter:
         return (*((BEARINGS, bearing.name) for bearing in bearings),
                 *((PEDESTALS, bearing.name) for bearing in bearings
                   if bearing.pedestal is not None),
-                *((kind, block.name) for kind in soil for block in self.model.foundations))
+                *((kind, block.name) for kind in soil for block in self.model.foundations),
+                *((_OF_SHAFT[index], 'rotor') for index in self._losing))
+
+    @cached_property
+    def _losing(self) -> list[int]:
+        """Which of what the shaft may do it does."""
+        losses = self.model.rotor.losses
+        does = (False,) * len(_OF_SHAFT) if losses is None else losses.does
+        return [index for index, one in enumerate(does) if one]
 
     def forced(self, speed: FloatArray, unbalance: ComplexArray) -> DampingSplit:
         """
@@ -161,8 +174,52 @@ class DampingSplitter:
         below = (through.reshape(flat) + inertia)[:, support.pedestal_axes]
         radiated = None if self._lossless is None else _pushed(
             self._lossless.ground(speed), motion)
-        return DampingSplit(speed, self.parts, math.pi * self._taken(
-            journal - housing, through, deflection, below, motion, into_soil, radiated))
+        taken = self._taken(journal - housing, through, deflection, below, motion, into_soil,
+                            radiated)
+        lost = self._lost(speed, self._whirls(speed, unbalance, journal, through))
+        return DampingSplit(speed, self.parts, math.pi * np.concatenate([taken, lost], axis=1))
+
+    def _whirls(
+        self, speed: FloatArray, unbalance: ComplexArray, journal: ComplexArray,
+        through: ComplexArray,
+    ) -> ComplexArray:
+        """Return forward and backward motion of all nodes of the shaft, (2, n, 2 k)."""
+        model, losses = self.model, self.model.rotor.losses
+        if losses is None:
+            return np.zeros((2, len(speed), 0), dtype=complex)
+        # Springs that lose a little hold the shaft, at no speed in resonance; what they exert is
+        # taken off again.
+        springs = model.nominal_springs * (1.0 + 0.5j)
+        loads = (model.plane_forces @ unbalance).reshape(-1, 2)
+        exerted = springs[:, None] * journal - through
+        stiffness, mass, polar = model.rotor.plane_matrices
+        rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
+        square, found = speed[:, None] ** 2, []
+        for direction, orbit in zip(WHIRL_DIRECTIONS, ORBITS.conj(), strict=True):
+            held, rate = losses.following(direction, order=1.0)
+            dynamic = (stiffness + held + speed[:, None, None] * rate
+                       - square[..., None] * (mass - direction * polar))
+            force = np.zeros(dynamic.shape[:2], dtype=complex)
+            for port, load in zip(model.ports, loads @ orbit, strict=True):
+                force[:, port] += square[:, 0] * load
+            for index, row in enumerate(rows):
+                dynamic[:, row, row] += springs[index]
+                force[:, row] += exerted[:, index] @ orbit
+            found.append(np.linalg.solve(dynamic, force[..., None])[..., 0])
+        return np.array(found)
+
+    def _lost(
+        self, speed: FloatArray, whirls: ComplexArray, w: ComplexArray | None = None,
+    ) -> FloatArray:
+        """Return Im(u^H F) of what the shaft does, (n, d)."""
+        losses = self.model.rotor.losses
+        if losses is None:
+            return np.zeros((len(speed), 0))
+        exerted = [losses.exerted(direction, motion, w=speed + 0j if w is None else w,
+                                  speed=speed)
+                   for direction, motion in zip(WHIRL_DIRECTIONS, whirls, strict=True)]
+        taken = (whirls.conj()[:, None] * exerted).imag.sum(axis=(0, 3))
+        return np.asarray(taken[self._losing].T)
 
     def of_modes(self, criticals: Sequence[CriticalSpeed]) -> list[DampingSplit | None]:
         """
@@ -203,15 +260,19 @@ class DampingSplitter:
         nodes = [model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
         pairs = (1, len(nodes), 2)
         gap = critical.deflection[nodes].ravel() - support.motion_rows @ critical.support
-        stiffness, damping = model.bearing_coefficients(speed)
-        through = (stiffness[0] + 1j * w * damping[0]) @ gap
+        stiffness, damping, inertia = (part[0] for part in model.bearings.coefficients(
+            speed, speed))
+        through = (stiffness + 1j * w * damping - w**2 * inertia) @ gap
         below = (support.motion_rows.T @ through
                  + w**2 * (support.motion_mass @ critical.support))[None]
         motion = critical.support[None, :blocks]
         radiated = None if lossless is None else _pushed(lossless, motion)
-        return DampingSplit(speed, self.parts, self._taken(
+        taken = self._taken(
             gap.reshape(pairs), through.reshape(pairs), critical.support[None, blocks:],
-            below[:, blocks:], motion, below[:, :blocks], radiated))
+            below[:, blocks:], motion, below[:, :blocks], radiated)
+        bent = np.stack([critical.deflection, critical.slope], axis=1).reshape(-1, 2)
+        lost = self._lost(speed, (bent @ ORBITS.conj().T).T[:, None], np.array([w]))
+        return DampingSplit(speed, self.parts, np.concatenate([taken, lost], axis=1))
 
     def _taken(
         self, gap: ComplexArray, through: ComplexArray, deflection: ComplexArray,

@@ -146,8 +146,8 @@ def _about(
 ) -> tuple[FloatArray, FloatArray]:
     """Return speeds [rad/s] and answers about a middle, as far as bearings and ground go."""
     while True:
-        speed = np.linspace(*model.within_tables(((1.0 - reach) * middle, (1.0 + reach) * middle)),
-                            _RESPONSE_POINTS)
+        ends = model.bearings.within_tables(((1.0 - reach) * middle, (1.0 + reach) * middle))
+        speed = np.linspace(*ends, _RESPONSE_POINTS)
         try:
             return speed, np.abs(model.unbalance_response(speed, excites).displacement)
         except OutOfTableError:

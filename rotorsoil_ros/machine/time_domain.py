@@ -15,6 +15,7 @@ from rotorsoil_ros.channel import across, Channel, HOUSING
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.coefficients import values
 
 # Modes of the shaft with its journals held, in each plane.
 _MODES = 12
@@ -80,6 +81,10 @@ def shake(
     """
     if any(bearing.pedestal is not None for bearing in model.rotor.bearings) or model.couples:
         raise RotorSoilError('integration in time knows no pedestals and no couples')
+    if model.rotor.losses is not None or len(model.bearings.frequencies) or any(
+            np.any(values(bearing.inertia)) for bearing in model.rotor.bearings):
+        raise RotorSoilError('integration in time knows no damping of and no torque in the shaft, '
+                             'no inertia of bearings and no tables over frequency')
     system = _System(model, speed)
     step = float(time[1] - time[0])
     rate = np.gradient(speed, time)
@@ -166,7 +171,7 @@ class _System:
             Of the soil, over the last s coordinates.
 
         """
-        spring, damper = self._model.bearing_coefficients(speed)
+        spring, damper, _ = self._model.bearings.coefficients(speed, speed)
         stiffness = self._shaft + self._stretch.T @ spring @ self._stretch
         damping = (self._stretch.T @ damper @ self._stretch
                    + speed[:, None, None] * self._gyroscopic)

@@ -12,6 +12,7 @@ from rotorsoil_ros.arrays import BoolArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.events import Event, NANOSECONDS, Predicted
+from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.identification.case import identify_case, UsedVectors, Wanted
 from rotorsoil_ros.monitor.identification.words import widening
@@ -56,6 +57,8 @@ class Minute:
     ground_factor, ground_factor_error : float
         Effective shear modulus over that of the case, and its standard error within the
         tolerances of the case [-].
+    unstable : int
+        How many speeds have no answer, as the machine is unstable at them.
 
     """
 
@@ -76,6 +79,7 @@ class Minute:
     zone_measured: str = ''
     ground_factor: float = math.nan
     ground_factor_error: float = math.nan
+    unstable: int = 0
 
 
 COLUMNS = tuple(field.name for field in fields(Minute))
@@ -89,12 +93,15 @@ class Minutes:
     same to the last bit however the messages come: one by one or in thousands.
     """
 
-    def __init__(self, machine: str, channels: Sequence[Channel]) -> None:
+    def __init__(
+        self, machine: str, channels: Sequence[Channel], stability: Stability,
+    ) -> None:
         self.machine = machine
+        self._stability = stability
         self._channels = tuple(channels)
         self._open: list[tuple[FloatArray, FloatArray]] = []
         self._minute = 0
-        self._answered: dict[int, list[tuple[int, float, FloatArray]]] = {}
+        self._answered: dict[int, list[tuple[int, float, FloatArray, int]]] = {}
         self._zones: dict[tuple[int, Channel, str], str] = {}
 
     def __call__(self, event: Event) -> None:
@@ -124,7 +131,7 @@ class Minutes:
         answered = np.isfinite(size).any(axis=1)
         self._answered.setdefault(self._minute, []).append((
             int(np.count_nonzero(answered)), float(speed[answered].sum()),
-            size[answered].sum(axis=0)))
+            size[answered].sum(axis=0), int(np.count_nonzero(~self._stability.holds(speed)))))
 
     def rows(
         self, points: Sequence[ChannelPoints] = (), *, margin: float = 0.0,
@@ -154,16 +161,17 @@ class Minutes:
         ground: tuple[float, float] | None,
     ) -> Iterator[Minute]:
         parts = self._answered.get(minute, [])
-        number = sum(count for count, _, _ in parts)
-        speed = sum(total for _, total, _ in parts)
-        size = np.sum([total for _, _, total in parts], axis=0)
+        number = sum(count for count, _, _, _ in parts)
+        speed = sum(total for _, total, _, _ in parts)
+        size = np.sum([total for _, _, total, _ in parts], axis=0)
+        unstable = sum(lost for _, _, _, lost in parts)
         factor, error = ground or (math.nan, math.nan)
         for column, channel in enumerate(self._channels):
             row = Minute(
                 self.machine, minute * MINUTE_NS, channel.name, channel.unit, number,
                 zone_predicted=self._zones.get((minute, channel, 'predicted'), ''),
                 zone_measured=self._zones.get((minute, channel, 'measured'), ''),
-                ground_factor=factor, ground_factor_error=error,
+                ground_factor=factor, ground_factor_error=error, unstable=unstable,
                 **measured.get((minute, channel), {}))
             yield replace(row, speed_rad_s=speed / number,
                           predicted=float(size[column]) / number) if number else row

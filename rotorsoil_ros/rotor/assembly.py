@@ -5,13 +5,15 @@ from functools import cached_property
 import math
 
 import numpy as np
+import scipy.linalg
 
-from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import across, Channel, HOUSING, JOURNAL
 from rotorsoil_ros.errors import require, RotorSoilError
-from rotorsoil_ros.rotor.beam import BeamElements, plane_matrices
+from rotorsoil_ros.rotor.beam import BeamElements, element_matrices, ElementMatrices
 from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.rotor.disc import Disc
+from rotorsoil_ros.rotor.losses import Losses
 from rotorsoil_ros.rotor.shaft import Probe, ShaftSection
 
 # Stations closer than this share of the shaft length to a node are that node.
@@ -31,6 +33,8 @@ class Rotor:
         From left to right, y = 0 at the left end.
     discs, bearings, probes
         Stations; each becomes a node of the mesh.
+    drag : float
+        Damping of the discs that does not turn, proportional to their mass [1/s].
 
     """
 
@@ -39,11 +43,13 @@ class Rotor:
     discs: tuple[Disc, ...]
     bearings: tuple[Bearing, ...]
     probes: tuple[Probe, ...] = ()
+    drag: float = 0.0
 
     def __post_init__(self) -> None:
         require(math.isfinite(self.shaft_height), 'shaft_height', 'finite, in m',
                 self.shaft_height)
         require(len(self.shaft) > 0, 'shaft', 'one section or more', 0)
+        require(0.0 <= self.drag < math.inf, 'drag', '>= 0 1/s and finite', self.drag)
         places = {bearing.position for bearing in self.bearings}
         require(len(places) >= 2, 'bearings', 'at two places or more', len(places))
         length = self.length
@@ -51,6 +57,24 @@ class Rotor:
             if not -_SAME_NODE * length <= station.position <= length * (1.0 + _SAME_NODE):
                 raise RotorSoilError(f'position of {station.name} must be on the shaft, '
                                      f'0 to {length:g} m, got {station.position:g}')
+
+        if any(section.axial_force < 0.0 for section in self.shaft):
+            factor = self.buckling_factor
+            if not factor > 1.0:
+                raise RotorSoilError('axial_force must stay below the load that buckles the '
+                                     f'shaft, 1 times it, got {1.0 / factor:.4g}')
+
+    @property
+    def buckling_factor(self) -> float:
+        """Times its axial force at which the shaft buckles on rigid bearings; may be infinite."""
+        parts = self._parts
+        elastic, tension = self._assembled(parts.elastic), self._assembled(parts.tension)
+        held = [2 * self.node_of(bearing.position) for bearing in self.bearings]
+        free = np.setdiff1d(np.arange(len(elastic)), held)
+        inside = np.ix_(free, free)
+        most = float(scipy.linalg.eigh(-tension[inside], elastic[inside], eigvals_only=True,
+                                       subset_by_index=[len(free) - 1, len(free) - 1])[0])
+        return 1.0 / most if most > 0.0 else math.inf
 
     @property
     def stations(self) -> tuple[Disc | Bearing | Probe, ...]:
@@ -89,12 +113,18 @@ class Rotor:
         """Return the index of the mesh node at a station's position [m]."""
         return int(np.argmin(np.abs(self.node_positions - position)))
 
+    @cached_property
+    def _owner(self) -> IntArray:
+        """Which section each element is of."""
+        ends = np.cumsum([section.length for section in self.shaft])
+        return np.searchsorted(ends, 0.5 * (self.node_positions[:-1] + self.node_positions[1:]))
+
     @property
     def elements(self) -> BeamElements:
         """The shaft's finite elements, one between each two neighbouring nodes."""
         ends = np.cumsum([section.length for section in self.shaft])
         left, right = self.node_positions[:-1], self.node_positions[1:]
-        owner = np.searchsorted(ends, 0.5 * (left + right))
+        owner = self._owner
         sections = [self.shaft[i] for i in owner]
         start = (ends - np.array([section.length for section in self.shaft]))[owner]
         share = np.stack([left - start, right - start], axis=1)
@@ -113,7 +143,21 @@ class Rotor:
             poisson_ratio=np.array([material.poisson_ratio for material in materials]),
             density=np.array([material.density for material in materials]),
             added_mass=np.array([section.added_mass for section in sections]),
+            axial_force=np.array([section.axial_force for section in sections]),
+            torque=np.array([section.torque for section in sections]),
         )
+
+    @cached_property
+    def _parts(self) -> ElementMatrices:
+        return element_matrices(self.elements)
+
+    def _assembled(self, parts: FloatArray) -> FloatArray:
+        """Add up matrices of the elements, (e, 4, 4), over all nodes."""
+        count = 2 * len(self.node_positions)
+        total = np.zeros((count, count))
+        for node, part in enumerate(parts):
+            total[2 * node:2 * node + 4, 2 * node:2 * node + 4] += part
+        return total
 
     @cached_property
     def plane_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -124,22 +168,37 @@ class Rotor:
         -------
         three (2 k, 2 k) float arrays
             Over (deflection, slope) of the k nodes. In the z plane the slope is rx, in the
-            x plane it is -rz. Bearings are not in it.
+            x plane it is -rz. Axial forces are in it, bearings are not.
 
         """
-        count = 2 * len(self.node_positions)
-        totals = (np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count)))
-        for total, parts in zip(totals, plane_matrices(self.elements), strict=True):
-            for node, part in enumerate(parts):
-                total[2 * node:2 * node + 4, 2 * node:2 * node + 4] += part
-        _, mass, polar = totals
+        parts = self._parts
+        stiffness = self._assembled(parts.elastic + parts.tension)
+        mass, polar = self._assembled(parts.mass), self._assembled(parts.polar)
         for disc in self.discs:
             deflection = 2 * self.node_of(disc.position)
             slope = deflection + 1
             mass[deflection, deflection] += disc.mass
             mass[slope, slope] += disc.diametral_inertia
             polar[slope, slope] += disc.polar_inertia
-        return totals
+        return stiffness, mass, polar
+
+    @cached_property
+    def losses(self) -> Losses | None:
+        """What shaft and discs do beside bending and swinging; None where they do nothing."""
+        parts = self._parts
+        damping = [self.shaft[owner].damping for owner in self._owner]
+        viscous, hysteretic, heavy, stiff = (
+            np.array([getattr(one, name) for one in damping])[:, None, None]
+            for name in ('viscous', 'loss_factor', 'fixed_mass', 'fixed_stiffness'))
+        fixed = self._assembled(heavy * parts.mass + stiff * (parts.elastic + parts.tension))
+        for disc in self.discs:
+            row = 2 * self.node_of(disc.position)
+            fixed[row, row] += self.drag * disc.mass
+            fixed[row + 1, row + 1] += self.drag * disc.diametral_inertia
+        found = Losses(self._assembled(viscous * parts.elastic),
+                       self._assembled(hysteretic * parts.elastic), fixed,
+                       self._assembled(parts.torsion), self._assembled(stiff * parts.torsion))
+        return found if any(found.does) else None
 
     @property
     def mass(self) -> float:

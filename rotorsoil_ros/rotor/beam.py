@@ -27,6 +27,8 @@ class BeamElements:
         Material [Pa], [-], [kg/m^3].
     added_mass : (e,) float array
         Mass per length that does not stiffen [kg/m].
+    axial_force, torque : (e,) float array
+        Tension [N], and what is exerted on the right end about the axis [N m].
 
     """
 
@@ -37,6 +39,8 @@ class BeamElements:
     poisson_ratio: FloatArray
     density: FloatArray
     added_mass: FloatArray
+    axial_force: FloatArray
+    torque: FloatArray
 
     @property
     def shear_modulus(self) -> FloatArray:
@@ -121,30 +125,52 @@ def _shape_functions(
     return deflection, rotation, curvature, strain
 
 
-def plane_matrices(elements: BeamElements) -> tuple[FloatArray, FloatArray, FloatArray]:
+@dataclass(frozen=True, slots=True)
+class ElementMatrices:
     """
-    Return stiffness, mass and gyroscopic matrices of Timoshenko elements in one plane.
+    Matrices of elements in one plane, (e, 4, 4) each, over (deflection, slope) of both nodes.
+
+    Attributes
+    ----------
+    elastic, mass : (e, 4, 4) float array
+        Stiffness without any load [N/m, N, N m], mass with rotary inertia [kg, kg m, kg m^2].
+    polar : (e, 4, 4) float array
+        Polar inertia of the rotations [kg m^2]: couples the two planes at spin speed.
+    tension : (e, 4, 4) float array
+        What the axial force adds to the stiffness.
+    torsion : (e, 4, 4) float array
+        What the torque makes of a motion in one plane in the other one; not symmetric.
+
+    """
+
+    elastic: FloatArray
+    mass: FloatArray
+    polar: FloatArray
+    tension: FloatArray
+    torsion: FloatArray
+
+
+def element_matrices(elements: BeamElements) -> ElementMatrices:
+    """
+    Return the matrices of Timoshenko elements.
 
     Parameters
     ----------
     elements : BeamElements
         The shaft's elements.
 
-    Returns
-    -------
-    three (e, 4, 4) float arrays
-        Stiffness [N/m, N, N m], consistent mass with rotary inertia [kg, kg m, kg m^2] and
-        polar inertia of the rotations [kg m^2], all symmetric, over (deflection, slope) of
-        the left and the right node. The polar inertia couples the two planes at spin speed.
-
     Notes
     -----
-    Exact for a uniform element at rest; a conical one has the shear parameter of its middle.
+    Exact for a uniform element at rest; a conical one has the shear parameter of its middle. An
+    axial force does work on the slope of the deflection, P w'^2 / 2. The torque is a couple that
+    keeps its direction along the axis: on the slope in one plane it bends the other one, in
+    which a slender beam is taken, as in Zorzi & Nelson.
 
     References
     ----------
     Lalanne & Ferraris, Rotordynamics Prediction in Engineering, 2nd ed. (1998), sec. 1.2;
-    Przemieniecki (1968), sec. 11.
+    Przemieniecki (1968), sec. 11 and, for the axial force, sec. 15; Zorzi & Nelson (1980),
+    J. Mech. Des. 102, p. 158, for the torque.
 
     """
     place = 0.5 * (_POINTS + 1.0)
@@ -171,4 +197,8 @@ def plane_matrices(elements: BeamElements) -> tuple[FloatArray, FloatArray, Floa
                  + integral(shear_stiffness[:, None] * area, strain))
     mass = (integral(density * area + elements.added_mass[:, None], deflection)
             + integral(density * moment, rotation))
-    return stiffness, mass, integral(2.0 * density * moment, rotation)
+    _, slope, bend, _ = _shape_functions(place, elements.length, np.zeros_like(shear))
+    return ElementMatrices(
+        stiffness, mass, integral(2.0 * density * moment, rotation),
+        integral(elements.axial_force[:, None], rotation + strain),
+        np.einsum('eg,egi,egj->eij', step * elements.torque[:, None], bend, slope))

@@ -1,64 +1,28 @@
-"""What holds the shaft: bearings and seals, their tables over speed, and their pedestals."""
+"""What holds the shaft: bearings and seals, their tables, and their pedestals."""
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
-from rotorsoil_ros.units import rad_s_to_rpm
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PchipInterpolator
+from rotorsoil_ros.rotor.coefficients import (
+    at,
+    Coefficients,
+    FrequencyTable,
+    SpeedTable,
+    tables,
+    times,
+    values,
+)
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Share of a speed by which round-off may put it beyond a table.
 _ROUNDING = 1e-12
 
-
-@dataclass(frozen=True)
-class SpeedTable:
-    """
-    2 x 2 coefficients over rotor speed, a monotone cubic between the points.
-
-    Attributes
-    ----------
-    speed : (s,) float array
-        Rising rotor speeds, two or more [rad/s].
-    values : (s, 2, 2) float array
-        Over (x, z) at each of them.
-
-    References
-    ----------
-    Fritsch & Butland (1984), SIAM J. Sci. Stat. Comput. 5: between two points it overshoots
-    neither of them.
-
-    """
-
-    speed: FloatArray
-    values: FloatArray
-
-    def __post_init__(self) -> None:
-        count = len(self.speed)
-        if not (self.speed.shape == (count,) and count >= 2 and np.all(np.isfinite(self.speed))
-                and self.speed[0] >= 0.0 and np.all(np.diff(self.speed) > 0.0)):
-            raise RotorSoilError('speeds of a table must be two or more, >= 0 rpm and rising, '
-                                 f'got {rad_s_to_rpm(self.speed).tolist()}')
-        if self.values.shape != (count, 2, 2) or not np.all(np.isfinite(self.values)):
-            raise RotorSoilError(f'values of a table must be {count} finite 2 x 2 matrices, '
-                                 f'got {self.values.tolist()}')
-
-    @cached_property
-    def _curve(self) -> 'PchipInterpolator':
-        from scipy.interpolate import PchipInterpolator  # as slow to import as half of a start
-
-        return PchipInterpolator(self.speed, self.values, axis=0, extrapolate=False)
-
-    def __call__(self, speed: FloatArray) -> FloatArray:
-        """Return the coefficients at speeds (n,) [rad/s], (n, 2, 2); NaN outside the table."""
-        return np.asarray(self._curve(speed))
+_UNITS = {'stiffness': 'N/m', 'damping': 'N s/m', 'inertia': 'kg'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +71,8 @@ class Bearing:
         Along the shaft [m].
     foundation : str or None
         Name of the block on which its housing stands; None is ground that does not move.
-    stiffness, damping : (2, 2) float array or SpeedTable
-        Over (x, z), cross terms included [N/m], [N s/m].
+    stiffness, damping, inertia : (2, 2) float array, SpeedTable or FrequencyTable
+        Over (x, z), cross terms included [N/m], [N s/m], [kg]; an inertia over the speed at most.
     pedestal : Pedestal or None
         What carries the housing; None is rigid.
 
@@ -117,91 +81,110 @@ class Bearing:
     name: str
     position: float
     foundation: str | None
-    stiffness: FloatArray | SpeedTable
-    damping: FloatArray | SpeedTable
+    stiffness: Coefficients
+    damping: Coefficients
     pedestal: Pedestal | None = None
+    inertia: FloatArray | SpeedTable = field(default_factory=lambda: np.zeros((2, 2)))
 
     def __post_init__(self) -> None:
-        for name, unit in (('stiffness', 'N/m'), ('damping', 'N s/m')):
-            matrix = getattr(self, name)
-            if not isinstance(matrix, SpeedTable):
+        for (name, unit), matrix in zip(_UNITS.items(), self.matrices, strict=True):
+            if not isinstance(matrix, (SpeedTable, FrequencyTable)):
                 _require_matrix(name, unit, matrix)
-        if not np.any(_values(self.stiffness)) and not np.any(_values(self.damping)):
-            raise RotorSoilError('stiffness and damping must not both be zero')
+        if not any(np.any(values(matrix)) for matrix in self.matrices):
+            raise RotorSoilError('stiffness, damping and inertia must not all be zero')
+
+    @property
+    def matrices(self) -> tuple[Coefficients, Coefficients, FloatArray | SpeedTable]:
+        """Stiffness, damping and inertia."""
+        return self.stiffness, self.damping, self.inertia
 
     @property
     def speed_range(self) -> tuple[float, float]:
         """Speeds at which its coefficients are known [rad/s]."""
-        tables = [matrix.speed for matrix in (self.stiffness, self.damping)
-                  if isinstance(matrix, SpeedTable)]
-        return (max((float(speed[0]) for speed in tables), default=-math.inf),
-                min((float(speed[-1]) for speed in tables), default=math.inf))
+        return _common(table.speed for matrix in self.matrices for table in tables(matrix))
+
+    @property
+    def frequency_range(self) -> tuple[float, float]:
+        """Frequencies of vibration at which its coefficients are known [rad/s]."""
+        return _common(matrix.frequency for matrix in self.matrices
+                       if isinstance(matrix, FrequencyTable))
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Frequencies at which a table bends [rad/s]."""
+        own = [matrix.frequency for matrix in self.matrices if isinstance(matrix, FrequencyTable)]
+        return np.unique(np.concatenate([np.zeros(0), *own]))
 
     @property
     def nominal_stiffness(self) -> float:
         """Mean direct stiffness over its directions and speeds [N/m]."""
-        return float(np.abs(np.diagonal(_values(self.stiffness), axis1=-2, axis2=-1)).mean())
+        return float(np.abs(np.diagonal(values(self.stiffness), axis1=-2, axis2=-1)).mean())
 
     @property
     def is_film(self) -> bool:
         """Whether it pushes across as fluid films do: cross terms that differ, over the speed."""
-        own = self.stiffness
-        return isinstance(own, SpeedTable) and bool(
-            np.any(own.values[:, 0, 1] != own.values[:, 1, 0]))
+        own = values(self.stiffness)
+        return bool(tables(self.stiffness)) and bool(np.any(own[..., 0, 1] != own[..., 1, 0]))
 
     def scaled(self, *, stiffness: float = 1.0, damping: float = 1.0) -> 'Bearing':
         """Return the same bearing with its stiffness and its damping times a factor each."""
-        return replace(self, stiffness=_times(stiffness, self.stiffness),
-                       damping=_times(damping, self.damping))
+        return replace(self, stiffness=times(stiffness, self.stiffness),
+                       damping=times(damping, self.damping))
 
-    def coefficients(self, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coefficients(
+        self, speed: FloatArray, omega: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Return stiffness and damping at each speed.
+        Return stiffness, damping and inertia.
 
         Parameters
         ----------
-        speed : (n,) float array
-            Rotor speed [rad/s].
+        speed, omega : (n,) float arrays
+            Rotor speed and frequency of the vibration [rad/s].
 
         Returns
         -------
-        two (n, 2, 2) float arrays
-            [N/m], [N s/m].
+        three (n, 2, 2) float arrays
+            [N/m], [N s/m], [kg].
 
         Raises
         ------
         OutOfTableError
-            If a table does not cover a speed: nothing is extrapolated.
+            If a table does not cover a speed or a frequency: nothing is extrapolated.
 
         """
-        low, high = self.speed_range
-        # A speed at the end of a table may come back from a sweep by a rounding beyond it.
-        held = np.clip(speed, low, high)
-        outside = ~(np.abs(speed - held) <= _ROUNDING * np.abs(speed))
+        held = self._held(speed, self.speed_range, 'speed', rad_s_to_rpm, 'rpm')
+        swung = self._held(omega, self.frequency_range, 'frequency', rad_s_to_hz, 'Hz')
+        stiffness, damping, inertia = (at(matrix, held, swung) for matrix in self.matrices)
+        return stiffness, damping, inertia
+
+    def _held(
+        self, given: FloatArray, span: tuple[float, float], what: str,
+        shown: Callable[[float], float], unit: str,
+    ) -> FloatArray:
+        """Return what is within a table, or raise an OutOfTableError."""
+        low, high = span
+        # What lies at the end of a table may come back from a sweep by a rounding beyond it.
+        held = np.clip(given, low, high)
+        outside = ~(np.abs(given - held) <= _ROUNDING * np.abs(given))
         if np.any(outside):
             raise OutOfTableError(
-                f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm, the '
-                f'table of {self.name}, got {rad_s_to_rpm(float(speed[outside][0])):g} rpm')
-        stiffness, damping = (
-            matrix(held) if isinstance(matrix, SpeedTable)
-            else np.broadcast_to(matrix, (len(speed), 2, 2))
-            for matrix in (self.stiffness, self.damping))
-        return stiffness, damping
+                f'{what} must be within {shown(low):g} to {shown(high):g} {unit}, the '
+                f'table of {self.name}, got {shown(float(given[outside][0])):g} {unit}')
+        return held
 
     def dynamic_stiffness(self, omega: FloatArray, speed: FloatArray) -> ComplexArray:
-        """Return K(speed) + i omega C(speed), (n, 2, 2) over (x, z) [N/m]."""
-        stiffness, damping = self.coefficients(speed)
-        return np.asarray(stiffness + 1j * omega[:, None, None] * damping)
+        """Return K + i omega C - omega^2 M, (n, 2, 2) over (x, z) [N/m]."""
+        stiffness, damping, inertia = self.coefficients(speed, omega)
+        w = omega[:, None, None]
+        return np.asarray(stiffness + 1j * w * damping - w**2 * inertia)
 
 
-def _times(factor: float, matrix: FloatArray | SpeedTable) -> FloatArray | SpeedTable:
-    if isinstance(matrix, SpeedTable):
-        return SpeedTable(matrix.speed, factor * matrix.values)
-    return factor * matrix
-
-
-def _values(matrix: FloatArray | SpeedTable) -> FloatArray:
-    return matrix.values if isinstance(matrix, SpeedTable) else matrix
+def _common(axes: Iterable[FloatArray]) -> tuple[float, float]:
+    """Return what all axes of tables cover; everything where there is none."""
+    ends = [(float(axis[0]), float(axis[-1])) for axis in axes]
+    return (max((low for low, _ in ends), default=-math.inf),
+            min((high for _, high in ends), default=math.inf))
 
 
 def _require_matrix(name: str, unit: str, matrix: FloatArray) -> None:

@@ -23,6 +23,34 @@ class Material:
 
 
 @dataclass(frozen=True, slots=True)
+class ShaftDamping:
+    """
+    What a piece of shaft loses: in its material, which turns with it, and to what stands still.
+
+    Attributes
+    ----------
+    viscous : float
+        Of the material, stress per rate of strain over stress per strain [s].
+    loss_factor : float
+        Of the material, hysteretic, the same at every frequency [-].
+    fixed_mass, fixed_stiffness : float
+        What does not turn, proportional to mass [1/s] and to stiffness [s].
+
+    """
+
+    viscous: float = 0.0
+    loss_factor: float = 0.0
+    fixed_mass: float = 0.0
+    fixed_stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (('viscous', 's'), ('fixed_mass', '1/s'), ('fixed_stiffness', 's')):
+            value = getattr(self, name)
+            require(0.0 <= value < math.inf, name, f'>= 0 {unit} and finite', value)
+        require(0.0 <= self.loss_factor < 1.0, 'loss_factor', 'in [0, 1)', self.loss_factor)
+
+
+@dataclass(frozen=True, slots=True)
 class ShaftSection:
     """
     Piece of shaft whose diameters vary linearly, divided evenly into elements.
@@ -39,6 +67,12 @@ class ShaftSection:
         What it is made of.
     added_mass : float
         Mass per length that does not stiffen [kg/m].
+    axial_force : float
+        That pulls it; a negative one presses [N].
+    torque : float
+        That what lies to the right exerts on it, about the spin [N m].
+    damping : ShaftDamping
+        What it loses.
 
     """
 
@@ -48,12 +82,17 @@ class ShaftSection:
     elements: int
     material: Material
     added_mass: float = 0.0
+    axial_force: float = 0.0
+    torque: float = 0.0
+    damping: ShaftDamping = ShaftDamping()
 
     def __post_init__(self) -> None:
         require(0.0 < self.length < math.inf, 'length', '> 0 m and finite', self.length)
         require(self.elements >= 1, 'elements', 'at least 1', self.elements)
         require(0.0 <= self.added_mass < math.inf, 'added_mass', '>= 0 kg/m and finite',
                 self.added_mass)
+        require(math.isfinite(self.axial_force), 'axial_force', 'finite, in N', self.axial_force)
+        require(math.isfinite(self.torque), 'torque', 'finite, in N m', self.torque)
         for outer, inner in zip(self.outer_diameter, self.inner_diameter, strict=True):
             require(0.0 < outer < math.inf, 'outer_diameter', '> 0 m and finite', outer)
             require(0.0 <= inner < outer, 'inner_diameter',

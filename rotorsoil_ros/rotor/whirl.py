@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
+from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.rotor.assembly import Rotor
+from rotorsoil_ros.rotor.losses import receding, WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.projection import shapes_at_ports
 
 # A mode whose dynamic stiffness fell below this share of its static one is kept out of the sum
@@ -35,16 +36,19 @@ class WhirlModes:
     K0 - omega^2 (M - J / order), in backward whirl K0 - omega^2 (M + J / order), where J is
     the polar inertia. Two real symmetric eigenproblems therefore serve every speed. At fixed
     speed they are K0 - omega^2 M +- omega speed J, and one problem of twice the size serves
-    every omega.
+    every omega. A rotor that loses energy has complex modes, the ones that resonate and the ones
+    that are driven differ, and two problems of twice the size serve either purpose.
 
     Attributes
     ----------
-    inverse : (2, m) float array
+    inverse : (2, m) float or complex array
         1 / omega_k^power of forward and backward modes; negative where it is no resonance.
-    shapes : (2, p, m) float array
+    shapes : (2, p, m) float or complex array
         Their shapes at the ports, normalised to unit energy.
+    driven : (2, p, m) float or complex array
+        How much a force at each port drives them: the same where nothing is lost.
     power : int
-        2 where speed follows omega, 1 at fixed speed.
+        2 where speed follows omega and nothing is lost, else 1.
 
     References
     ----------
@@ -52,8 +56,9 @@ class WhirlModes:
 
     """
 
-    inverse: FloatArray
-    shapes: FloatArray
+    inverse: AnyArray
+    shapes: AnyArray
+    driven: AnyArray
     power: int
 
     @classmethod
@@ -76,15 +81,19 @@ class WhirlModes:
 
         """
         stiffness, mass, polar = held(rotor, springs)
-        pairs = [_modes(mass + direction / order * polar, stiffness)
-                 for direction in (-1.0, 1.0)]
-        return cls(np.array([values for values, _ in pairs]),
-                   np.array([shapes[ports] for _, shapes in pairs]), 2)
+        if rotor.losses is not None:
+            return cls._lossy(rotor, ports, springs, [
+                (*rotor.losses.following(direction, order=order), mass - direction / order * polar)
+                for direction in WHIRL_DIRECTIONS])
+        pairs = [_modes(mass - direction / order * polar, stiffness)
+                 for direction in WHIRL_DIRECTIONS]
+        shapes = np.array([own[ports] for _, own in pairs])
+        return cls(np.array([values for values, _ in pairs]), shapes, shapes, 2)
 
     @classmethod
     def at(
         cls, rotor: Rotor, ports: list[int], *, springs: FloatArray, speed: float,
-        highest: float,
+        highest: float, lag: float = 0.0,
     ) -> 'WhirlModes':
         """
         Solve for the modes at fixed speed.
@@ -98,9 +107,17 @@ class WhirlModes:
         highest : float
             Frequency up to which the receptance is wanted [rad/s]: of many elements no more
             shapes are kept than it takes.
+        lag : float
+            Sign of the frequencies less the speed.
 
         """
         matrices = held(rotor, springs)
+        if rotor.losses is not None:
+            _, mass, polar = matrices
+            return cls._lossy(rotor, ports, springs, [
+                (rotor.losses.held(direction, speed=speed, lag=lag),
+                 rotor.losses.rate(direction) + direction * speed * polar, mass)
+                for direction in WHIRL_DIRECTIONS])
         try:
             basis = shapes_at_ports(*matrices, ports, highest=highest, speed=speed)
         except np.linalg.LinAlgError as error:
@@ -110,7 +127,25 @@ class WhirlModes:
         inverse, vectors = np.linalg.eigh(
             spinning(np.maximum(squares, 0.0), rest.T @ polar @ rest, np.array([speed])))
         shapes = basis[ports] @ rest @ vectors[0, :len(rest)]
-        return cls(np.array([inverse[0], -inverse[0]]), np.array([shapes, shapes]), 1)
+        both = np.array([shapes, shapes])
+        return cls(np.array([inverse[0], -inverse[0]]), both, both, 1)
+
+    @classmethod
+    def _lossy(
+        cls, rotor: Rotor, ports: list[int], springs: FloatArray,
+        added: list[tuple[ComplexArray, ComplexArray, FloatArray]],
+    ) -> 'WhirlModes':
+        """Solve for the modes with what adds to stiffness and rate of each direction, and mass."""
+        stiffness, mass, _ = held(rotor, springs)
+        # Over the modes at rest all entries are alike, which deflections and slopes are not.
+        squares, rest = _modes(mass, stiffness)
+        one = np.eye(len(rest))
+        found = [receding(one + rest.T @ more @ rest, rest.T @ rate @ rest,
+                          rest.T @ weight @ rest, float(squares.max() ** -0.5))
+                 for more, rate, weight in added]
+        return cls(np.array([inverse for inverse, _, _ in found]),
+                   np.array([rest[ports] @ right for _, right, _ in found]),
+                   np.array([rest[ports] @ left.T for _, _, left in found]), 1)
 
     def receptance(self, omega: FloatArray) -> 'PortReceptance':
         """
@@ -132,23 +167,26 @@ class WhirlModes:
         nearest = np.argsort(size, axis=1)[:, :near]
         gain = 1.0 / np.where(size < np.finfo(float).tiny, 1.0, stiffness)
         np.put_along_axis(gain, nearest, 0.0, axis=1)
-        shapes = self.shapes[directions, :, indices]
+        shapes, driven = (own[directions, :, indices] for own in (self.shapes, self.driven))
         powers = np.vander(argument / scale, _TERMS, increasing=True)
         receptances = np.stack([
             powers @ self._series(direction, ~close[direction], scale)
-            + gain[:, directions == direction] @ _squares(shapes[directions == direction])
+            + gain[:, directions == direction] @ _products(
+                shapes[directions == direction], driven[directions == direction])
             for direction in (0, 1)])
         ports = self.shapes.shape[1]
-        whirls = (shapes[:, :, None] * ORBITS[directions, None]).reshape(-1, 2 * ports)
+        whirls, forced = ((own[:, :, None] * orbits[directions, None]).reshape(-1, 2 * ports)
+                          for own, orbits in ((shapes, ORBITS), (driven, ORBITS.conj())))
         return PortReceptance(receptances.reshape(2, len(omega), ports, ports),
-                              whirls[nearest].transpose(0, 2, 1),
+                              whirls[nearest].transpose(0, 2, 1), forced[nearest],
                               np.take_along_axis(stiffness, nearest, axis=1))
 
-    def _series(self, direction: int, far: BoolArray, scale: float) -> FloatArray:
+    def _series(self, direction: int, far: BoolArray, scale: float) -> ComplexArray:
         """Return the receptance of far modes as a power series, (terms, p^2)."""
         ratio = scale * self.inverse[direction, far]
         powers = np.vander(ratio, _TERMS, increasing=True)
-        return np.asarray(powers.T @ _squares(self.shapes[direction][:, far].T))
+        return np.asarray(powers.T @ _products(self.shapes[direction][:, far].T,
+                                               self.driven[direction][:, far].T))
 
 
 def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -166,22 +204,25 @@ class PortReceptance:
     Receptance of the rotor on its springs: a regular part and the modes close to resonance.
 
     The motion under port forces F is X = regular F + shapes p, where the amplitudes p of the
-    nearly resonant modes obey stiffness p = shapes^H F.
+    nearly resonant modes obey stiffness p = driven F.
 
     Attributes
     ----------
-    regular : (2, n, p, p) float array
+    regular : (2, n, p, p) float or complex array
         Receptance of all other modes in forward and in backward whirl [m/N].
     shapes : (n, 2 p, k) complex array
         Shapes of the k modes kept apart, over (x, z) of each port.
-    stiffness : (n, k) float array
+    driven : (n, k, 2 p) complex array
+        How much forces over (x, z) of each port drive them.
+    stiffness : (n, k) float or complex array
         Their dynamic stiffness, 1 - omega^2 / omega_k^2; it may be zero.
 
     """
 
-    regular: FloatArray
+    regular: AnyArray
     shapes: ComplexArray
-    stiffness: FloatArray
+    driven: ComplexArray
+    stiffness: AnyArray
 
     def motion(self, forces: ComplexArray) -> ComplexArray:
         """
@@ -205,9 +246,12 @@ class PortReceptance:
         turned = (forces.reshape(sets, count, 2, columns).swapaxes(1, 2).reshape(sets, 2, -1)
                   .swapaxes(0, 1).reshape(2, -1))
         whirls = (ORBITS.conj() @ turned).reshape(2, sets, count, columns)
-        # The receptance is real: as pairs of real numbers no complex copy of it is needed.
-        pairs = self.regular[..., :count] @ whirls.view(float)
-        answers = pairs.view(complex).reshape(2, -1)
+        if np.iscomplexobj(self.regular):
+            answers = (self.regular[..., :count] @ whirls).reshape(2, -1)
+        else:
+            # Real, as nothing is lost: as pairs of real numbers it needs no complex copy.
+            pairs = self.regular[..., :count] @ whirls.view(float)
+            answers = pairs.view(complex).reshape(2, -1)
         motion = (ORBITS.T @ answers).reshape(2, length, ports, columns)
         return np.asarray(np.moveaxis(motion, 0, 2).reshape(length, 2 * ports, columns))
 
@@ -221,9 +265,9 @@ class PortReceptance:
         return total.reshape(-1, 2 * count, 2 * count)
 
 
-def _squares(shapes: FloatArray) -> FloatArray:
-    """Return the products of a shape's values at two ports, (m, p) to (m, p^2)."""
-    return (shapes[:, :, None] * shapes[:, None]).reshape(-1, shapes.shape[1] ** 2)
+def _products(shapes: ComplexArray, driven: ComplexArray) -> ComplexArray:
+    """Return the products of two values of each mode at two ports, (m, p) to (m, p^2)."""
+    return (shapes[:, :, None] * driven[:, None]).reshape(-1, shapes.shape[1] ** 2)
 
 
 def held(rotor: Rotor, springs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

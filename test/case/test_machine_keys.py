@@ -9,7 +9,7 @@ import pytest
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.rotor.coefficients import SpeedTable
 from rotorsoil_ros.units import rpm_to_rad_s
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
@@ -30,7 +30,8 @@ def bearing_of(*settings):
 def test_bearing_follows_its_table_over_speed():
     bearing = bearing_of(f'{TABLE}, xz: [1, 2, 3]}}')
     assert isinstance(bearing.stiffness, SpeedTable)
-    stiffness, damping = bearing.coefficients(rpm_to_rad_s(np.array([60.0, 3000.0, 9000.0])))
+    speeds = rpm_to_rad_s(np.array([60.0, 3000.0, 9000.0]))
+    stiffness, damping, _ = bearing.coefficients(speeds, speeds)
     np.testing.assert_array_equal(stiffness, [
         [[1e8, 1.0], [0.0, 4e8]], [[2e8, 2.0], [0.0, 5e8]], [[3e8, 3.0], [0.0, 6e8]]])
     np.testing.assert_array_equal(damping, np.broadcast_to([[500.0, 0.0], [0.0, 500.0]],

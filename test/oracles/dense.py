@@ -26,16 +26,50 @@ def rotor_matrices(rotor: Rotor) -> tuple[FloatArray, FloatArray, FloatArray]:
 
     """
     stiffness, mass, polar = rotor.plane_matrices
-    count = len(rotor.node_positions)
-    # Plane dofs (deflection, slope) in node dofs: x and -rz, z and +rx.
-    in_x = np.kron(np.eye(count), np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]]))
-    in_z = np.kron(np.eye(count), np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]))
+    return alike(rotor, stiffness), alike(rotor, mass), across(rotor, polar)
 
-    def both(plane: FloatArray) -> FloatArray:
-        return np.asarray(in_x.T @ plane @ in_x + in_z.T @ plane @ in_z)
 
-    gyroscopic = in_z.T @ polar @ in_x - in_x.T @ polar @ in_z
-    return both(stiffness), both(mass), gyroscopic
+def planes(rotor: Rotor) -> tuple[FloatArray, FloatArray]:
+    """Return plane dofs (deflection, slope) in node dofs: x and -rz, z and +rx."""
+    count = np.eye(len(rotor.node_positions))
+    return (np.kron(count, np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]])),
+            np.kron(count, np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])))
+
+
+def alike(rotor: Rotor, plane: FloatArray) -> FloatArray:
+    """Return a matrix that is the same in both planes, over all dofs."""
+    in_x, in_z = planes(rotor)
+    return np.asarray(in_x.T @ plane @ in_x + in_z.T @ plane @ in_z)
+
+
+def across(rotor: Rotor, plane: FloatArray) -> FloatArray:
+    """Return a matrix by which x acts on z, and z on x with the other sign, over all dofs."""
+    in_x, in_z = planes(rotor)
+    return np.asarray(in_z.T @ plane @ in_x - in_x.T @ plane @ in_z)
+
+
+def shaft_forces(rotor: Rotor, omega: FloatArray, speed: FloatArray) -> ComplexArray:
+    """
+    Return what the shaft exerts besides stiffness and mass, (n, 4 k, 4 k).
+
+    Notes
+    -----
+    The material loses in the frame of the rotor: on z + i x it exerts V (d/dt - i Omega) of it,
+    and H i sign(w - Omega) of its forward, H i of its backward part. The torque T exerts
+    T B x on z and -T B z on x.
+
+    """
+    losses = rotor.losses
+    if losses is None:
+        return np.zeros((len(omega), *2 * (4 * len(rotor.node_positions),)), dtype=complex)
+    w, turn = omega[:, None, None], speed[:, None, None]
+    sign = np.sign(w - turn)
+    return np.asarray(
+        1j * w * alike(rotor, losses.viscous + losses.fixed)
+        + turn * across(rotor, losses.viscous) + across(rotor, losses.torsion)
+        + 1j * w * across(rotor, losses.coupled)
+        + 0.5j * (1.0 + sign) * alike(rotor, losses.hysteretic)
+        + 0.5 * (1.0 - sign) * across(rotor, losses.hysteretic))
 
 
 def dense_response(
@@ -122,10 +156,15 @@ def dense_eigenvalues(
     shaft, mass, gyroscopic = rotor_matrices(rotor)
     journals = _System.journals_of(rotor)
     relative = np.concatenate([journals, -support.motion_rows], axis=1)
-    springs, dampers = model.bearing_coefficients(np.array([speed]))
-    k = scipy.linalg.block_diag(shaft, stiffness) + relative.T @ springs[0] @ relative
-    c = scipy.linalg.block_diag(speed * gyroscopic, damping) + relative.T @ dampers[0] @ relative
-    m = scipy.linalg.block_diag(mass, support.motion_mass)
+    springs, dampers, inertia = (part[0] for part in model.bearings.coefficients(
+        *2 * (np.array([speed]),)))
+    if rotor.losses is not None:
+        held = shaft_forces(rotor, np.zeros(1), np.array([speed]))[0]
+        rate = shaft_forces(rotor, np.ones(1), np.array([speed]))[0] - held
+        shaft, gyroscopic = shaft + held, gyroscopic + rate / (1j * speed)
+    k = scipy.linalg.block_diag(shaft, stiffness) + relative.T @ springs @ relative
+    c = scipy.linalg.block_diag(speed * gyroscopic, damping) + relative.T @ dampers @ relative
+    m = scipy.linalg.block_diag(mass, support.motion_mass) + relative.T @ inertia @ relative
     # In units of time in which stiffness and mass are alike: digits.
     unit = np.sqrt(np.linalg.norm(k) / np.linalg.norm(m)) ** 0.5
     size, one = len(k), np.eye(len(k))
@@ -180,7 +219,7 @@ class _System:
         journals = np.concatenate([cls.journals_of(rotor), np.zeros((2 * len(rotor.bearings),
                                                                      total - size))], axis=1)
         seats = np.zeros_like(journals)
-        seats[:, size:size + blocks] = support.seat_rows.transpose(1, 0, 2).reshape(-1, blocks)
+        seats[:, size:size + blocks] = support.block_rows
         housings = seats.copy()
         for place, index in enumerate(own):
             housings[2 * index:2 * index + 2] = 0.0
@@ -188,11 +227,12 @@ class _System:
                 housings[2 * index + axis, size + blocks + 2 * place + axis] = 1.0
 
         square = omega[:, None, None] ** 2
-        through = model.bearing_stiffness(omega, speed) @ (journals - housings)
+        through = model.bearings.dynamic_stiffness(omega, speed) @ (journals - housings)
         into_seats = through.copy()
         matrix = np.zeros((len(omega), total, total), dtype=complex)
         matrix[:, :size, :size] = (stiffness - square * mass
-                                   + 1j * (omega * speed)[:, None, None] * gyroscopic)
+                                   + 1j * (omega * speed)[:, None, None] * gyroscopic
+                                   + shaft_forces(rotor, omega, speed))
         matrix += journals.T @ through
         for place, index in enumerate(own):
             pedestal, pair = rotor.bearings[index].pedestal, slice(2 * index, 2 * index + 2)

@@ -174,7 +174,7 @@ def test_gyroscopic_matrix_is_skew_and_turns_z_into_x():
     (lambda: ShaftSection(1.0, (0.1, 0.1), (0.1, 0.0), 2, STEEL), 'inner_diameter must be >= 0'),
     (lambda: ShaftSection(1.0, (0.1, 0.1), (0.0, 0.0), 0, STEEL), 'elements must be at least 1'),
     (lambda: Disc('d', 0.0, math.nan, 0.0, 0.0), 'mass must be >= 0 kg and finite, got nan'),
-    (lambda: Bearing('b', 0.0, None, np.zeros((2, 2)), np.zeros((2, 2))), 'must not both be zero'),
+    (lambda: Bearing('b', 0.0, None, np.zeros((2, 2)), np.zeros((2, 2))), 'must not all be zero'),
     (lambda: uniform_rotor(length=1.0, diameter=0.1, elements=2, material=STEEL,
                            bearings=[bearing('a', 0.0, stiffness=1.0),
                                      bearing('b', 1.5, stiffness=1.0)]),

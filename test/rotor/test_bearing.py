@@ -8,7 +8,8 @@ import pytest
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.campbell import campbell
-from rotorsoil_ros.rotor.bearing import Bearing, Pedestal, SpeedTable
+from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
+from rotorsoil_ros.rotor.coefficients import SpeedTable
 from rotorsoil_ros.rotor.disc import Disc, permissible_unbalance
 
 from machines import bearing, elastic_machine, STEEL, uniform_rotor

@@ -40,7 +40,8 @@ def modes_of(model, speed, *, gyroscopic):
     """Return eigenvalues (2 d,), and vectors (d, 2 d), of the full rotor on its bearings."""
     stiffness, mass, turning = rotor_matrices(model.rotor)
     damping = gyroscopic * speed * turning
-    springs, dampers = (one[0] for one in model.bearing_coefficients(np.array([speed])))
+    speeds = np.array([speed])
+    springs, dampers, _ = (one[0] for one in model.bearings.coefficients(speeds, speeds))
     journals = [4 * model.rotor.node_of(bearing.position) + axis
                 for bearing in model.rotor.bearings for axis in range(2)]
     place = np.ix_(journals, journals)

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.wire.cdr import Layout
-from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE
+from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, STRING
 from rotorsoil_ros.wire.handlers import SPEED_TOPICS
 from rotorsoil_ros.wire.messages import OWN_TOPICS, Records
 from rotorsoil_ros.wire.sensors import JointStateReader
@@ -31,7 +32,8 @@ COLUMNS: dict[str, type] = {
     **{f'{name}_{unit}': float for unit in ('m', 'rad') for name in SIZED},
     'predicted_phase_rad': float, 'measured_phase_rad': float,
     'predicted_velocity_m_s_rms': float, 'measured_velocity_m_s_rms': float,
-    'predicted_zone': str, 'measured_zone': str}
+    'predicted_zone': str, 'measured_zone': str, 'not_predicted': str}
+UNSTABLE, UNSTABLE_RANGES = 'unstable', 'unstable_rad_s'  # why nothing is predicted
 # From the topics of a node, and of a measuring system, to what they tell.
 TOLD_BY = {'amplitude': 'predicted', 'phase': 'predicted_phase', 'amplitude_low': 'predicted_low',
         'amplitude_high': 'predicted_high', 'residual': 'residual',
@@ -86,7 +88,8 @@ def export_log(
         rows: list[Mapping[str, Value]] = []
         tables = _Tables(wanted)
         for batch in bag_reader.batches(
-                log, lambda topic, kind: topic in wanted or kind == DIAGNOSTICS,
+                log, lambda topic, kind: topic in wanted or kind == DIAGNOSTICS or (
+                    kind == STRING and topic.endswith('/model')),
                 at_most=MESSAGES_AT_ONCE, span_ns=NANOSECONDS):
             rows += tables.take(batch)
             done += len(batch.payloads)
@@ -130,6 +133,7 @@ class _Machine:
         self._moments: dict[int, _Moment] = defaultdict(_Moment)
         self._speeds: dict[int, float] = {}
         self.zones: dict[str, str] = {}
+        self.unstable: list[tuple[float, float]] = []
 
     def tell(
         self, quantity: str, stamps: Sequence[int], names: Sequence[str], position: Any,
@@ -177,6 +181,8 @@ class _Machine:
             for source in ('predicted', 'measured'):
                 if source in told and name in told[source]:
                     row[f'{source}_zone'] = self.zones.get(f'{name}_{source}_zone', '')
+            if any(low <= speed <= high for low, high in self.unstable):
+                row['not_predicted'] = UNSTABLE
             yield row
 
 
@@ -194,6 +200,9 @@ class _Tables:
         if batch.type == DIAGNOSTICS:
             for payload in batch.payloads:
                 self._take_zones(payload)
+        elif batch.type == STRING:
+            for payload in batch.payloads:
+                self._take_model(batch.topic, payload)
         else:
             name, quantity = self._wanted[batch.topic]
             if quantity:
@@ -219,6 +228,17 @@ class _Tables:
             batch.type, USUAL, note=lambda reason, count: None))
         found = reader.read(batch.log_time_ns, batch.payloads)
         machine.turn(found.stamps, found.speed)
+
+    def _take_model(self, topic: str, payload: bytes) -> None:
+        """Keep at which speeds a machine is unstable, as the node tells of it."""
+        try:
+            told = json.loads(Layout.of(STRING, payload).texts['data'][0])
+            ranges = [(float(low), float(high)) for low, high in told[UNSTABLE_RANGES]]
+        except (InputError, ValueError, KeyError, TypeError):
+            return
+        name = topic.removesuffix('/model').rpartition('/')[2]
+        if name in self._machines:
+            self._machines[name].unstable = ranges
 
     def _take_zones(self, payload: bytes) -> None:
         """Keep the zones that the diagnostics of a node tell."""

@@ -97,7 +97,7 @@ def near_modes(model: CoupledModel, running: float) -> NearModes:
     for low, high in (*((low * running, high * running) for low, high in _REACHES),
                       asked(running)):
         try:
-            span = model.within_tables((low, high))
+            span = model.bearings.within_tables((low, high))
             found = critical_speeds(model, span)
         except (NotSolvedError, OutOfTableError) as error:
             doubt = f'critical speeds of the model are not known: {error}'

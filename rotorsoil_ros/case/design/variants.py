@@ -12,6 +12,7 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, Numbers, n
 from rotorsoil_ros.background import Mapper
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.machine import load, Machine
+from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.prediction import columns_of
@@ -46,7 +47,7 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """Channels and displacements, (n, c) [m, rad], of a variant; or why there are none."""
+    """Channels and displacements, (n, c) [m, rad], of a variant; why some or all are missing."""
 
     channels: tuple[Channel, ...] = ()
     displacement: ComplexArray | None = None
@@ -69,7 +70,7 @@ class Study:
     displacement : (..., n, c) complex array
         [m, rad], zero-to-peak; NaN where a variant has no steady response.
     failures : dict of tuple to str
-        By index why a variant has no answer at all.
+        By index why a variant has no answer, or none at some of the speeds.
 
     """
 
@@ -122,7 +123,7 @@ class Study:
                            'phase_rad': float(phase[at]), **(
                                {} if channel.is_rotation
                                else {'velocity_mm_s_rms': float(velocity[at])}),
-                           'failure': self.failures.get(place, '')}
+                           'failure': '' if np.isfinite(size[at]) else self.failures[place]}
 
 
 def study(
@@ -183,7 +184,11 @@ def try_variant(variant: Variant) -> Tried:
     """Solve one variant; what cannot be solved is a reason."""
     try:
         machine = Machine(variant.case.changed(variant.settings), variant.directory)
-        return Tried(machine.model.channels, machine.response(rpm=variant.rpm).displacement)
+        found = machine.response(rpm=variant.rpm).displacement
+        # What has no steady response says why, beside those of its speeds that have one.
+        why = '' if np.isfinite(found).all() else '; '.join(unstable(machine.stability(
+            rpm_range=(float(variant.rpm.min()), float(variant.rpm.max())))))
+        return Tried(machine.model.channels, found, why)
     except RotorSoilError as error:
         return Tried(failure=str(error))
 
@@ -200,9 +205,11 @@ def _study(
     failures = {}
     for index, each in enumerate(tried):
         place = tuple(int(number) for number in np.unravel_index(index, shape))
-        if each.displacement is None:
+        if each.failure:
             failures[place] = each.failure
-        elif each.channels != channels:
+        if each.displacement is None:
+            continue
+        if each.channels != channels:
             failures[place] = 'its channels are others than those of the first variant'
         else:
             found[index] = each.displacement

@@ -4,12 +4,13 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Tag
 
-from rotorsoil_ros.case.entries.entry import AXES, CONSTANT, Entry, NUMBER, TABLE
+from rotorsoil_ros.case.entries.entry import AXES, CONSTANT, Entry, MAP, NUMBER, TABLE
 from rotorsoil_ros.case.quantities import (
     Celsius,
     Clearance,
     Count,
     Degree,
+    Hertz,
     Kilogram,
     Metre,
     Name,
@@ -41,6 +42,15 @@ class Damping(Entry):
     zz: NewtonSecondPerMetre
 
 
+class Inertia(Entry):
+    """Of a seal's fluid, force direction first."""
+
+    xx: Kilogram
+    xz: Kilogram = 0.0
+    zx: Kilogram = 0.0
+    zz: Kilogram
+
+
 class StiffnessTable(Entry):
     """Stiffness at some speeds of the rotor."""
 
@@ -61,10 +71,42 @@ class DampingTable(Entry):
     zz: list[NewtonSecondPerMetre]
 
 
-def _over_speed(value: object) -> str:
-    is_table = (isinstance(value, (StiffnessTable, DampingTable))
-                or (isinstance(value, dict) and 'speed_rpm' in value))
-    return TABLE if is_table else CONSTANT
+class InertiaTable(Entry):
+    """Inertia at some speeds of the rotor."""
+
+    speed_rpm: list[Rpm]
+    xx: list[Kilogram]
+    xz: list[Kilogram] | None = None
+    zx: list[Kilogram] | None = None
+    zz: list[Kilogram]
+
+
+class StiffnessMap(Entry):
+    """Stiffness at some frequencies of vibration, a row of them for every speed of the rotor."""
+
+    speed_rpm: list[Rpm] | None = None
+    frequency_hz: list[Hertz]
+    xx: list[list[NewtonPerMetre]]
+    xz: list[list[NewtonPerMetre]] | None = None
+    zx: list[list[NewtonPerMetre]] | None = None
+    zz: list[list[NewtonPerMetre]]
+
+
+class DampingMap(Entry):
+    """Damping at some frequencies of vibration, a row of them for every speed of the rotor."""
+
+    speed_rpm: list[Rpm] | None = None
+    frequency_hz: list[Hertz]
+    xx: list[list[NewtonSecondPerMetre]]
+    xz: list[list[NewtonSecondPerMetre]] | None = None
+    zx: list[list[NewtonSecondPerMetre]] | None = None
+    zz: list[list[NewtonSecondPerMetre]]
+
+
+def _over_what(value: object) -> str:
+    keys = value if isinstance(value, dict) else type(value).model_fields if isinstance(
+        value, Entry) else ()
+    return MAP if 'frequency_hz' in keys else TABLE if 'speed_rpm' in keys else CONSTANT
 
 
 def _per_axis(value: object) -> str:
@@ -135,11 +177,14 @@ class BearingEntry(Entry):
     position: Metre
     foundation: Name | None = None
     stiffness: Annotated[
-        Annotated[Stiffness, Tag(CONSTANT)] | Annotated[StiffnessTable, Tag(TABLE)],
-        Discriminator(_over_speed)] | None = None
+        Annotated[Stiffness, Tag(CONSTANT)] | Annotated[StiffnessTable, Tag(TABLE)]
+        | Annotated[StiffnessMap, Tag(MAP)], Discriminator(_over_what)] | None = None
     damping: Annotated[
-        Annotated[Damping, Tag(CONSTANT)] | Annotated[DampingTable, Tag(TABLE)],
-        Discriminator(_over_speed)] | None = None
+        Annotated[Damping, Tag(CONSTANT)] | Annotated[DampingTable, Tag(TABLE)]
+        | Annotated[DampingMap, Tag(MAP)], Discriminator(_over_what)] | None = None
+    inertia: Annotated[
+        Annotated[Inertia, Tag(CONSTANT)] | Annotated[InertiaTable, Tag(TABLE)],
+        Discriminator(_over_what)] | None = None
     journal: JournalEntry | None = None
     load: tuple[Newton, Newton] | None = None
     alignment: Metre = 0.0

@@ -13,10 +13,11 @@ from rotorsoil_ros.case.document import shown
 
 # Which of two shapes a value has, where a file may choose; no key can be called so.
 CONSTANT, TABLE, NUMBER, AXES = '<constant>', '<table>', '<number>', '<axes>'
+MAP = '<map>'
 KEYS, WORD = '<keys>', '<word>'
 EVEN, LAYERED = '<even>', '<layered>'
 _REFUSED_KEY = '[key]'  # where pydantic refuses a key itself
-_SHAPES = (CONSTANT, TABLE, NUMBER, AXES, KEYS, WORD, EVEN, LAYERED, _REFUSED_KEY)
+_SHAPES = (CONSTANT, TABLE, MAP, NUMBER, AXES, KEYS, WORD, EVEN, LAYERED, _REFUSED_KEY)
 
 _WHAT = {
     'missing': 'is missing',
@@ -61,6 +62,11 @@ class Entry(BaseModel):
                        if not (detail['type'] == 'missing' and detail['loc'][-1:] in
                                {(name,) for name in meant.values()})]
         raise ValidationError.from_exception_data(cls.__name__, faults)
+
+
+def given_or_named(value: object) -> str:
+    """Return which shape something has that a file may spell out or call by its name."""
+    return WORD if isinstance(value, str) else KEYS
 
 
 def meant_key(key: Hashable, entry: type[Entry], value: Mapping[Hashable, Any]) -> str | None:

@@ -7,17 +7,17 @@ import re
 from typing import Any
 
 from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.ross.coefficients import CoefficientReader
 from rotorsoil_ros.case.ross.file import one_line, RossFile, Table
 from rotorsoil_ros.case.ross.shaft import ShaftReader
-from rotorsoil_ros.units import rad_s_to_rpm
+from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_rpm
 
 _SPEED_RANGE_RPM = (0.0, 10_000.0)
 _SHAFT_HEIGHT = 1.0
-# Coefficients of a bearing that the plane of the rotor does not feel, or that we do not have.
-_OTHER_COEFFICIENTS = ('kzz', 'czz', 'mxx', 'mxy', 'myx', 'myy', 'mzz')
+# Parameters of a model that are carried over as the damping of the rotor.
+_DAMPING = ('alpha', 'beta')
 # Parameters of a model that tell how it was run, and not what it is.
 _OF_A_RUN = ('min_w', 'max_w', 'rated_w', 'tag')
-_DIRECTIONS = (('xx', 'xx', 1.0), ('xz', 'xy', -1.0), ('zx', 'yx', -1.0), ('zz', 'yy', 1.0))
 
 
 @dataclass(frozen=True)
@@ -77,10 +77,15 @@ class _Importer:
 
     def imported(self, speed_range_rpm: tuple[float, float] | None) -> Imported:
         shaft, nodes = ShaftReader(self.file, self.assumed, self.lost).shaft()
+        damping = self._damping(shaft)
         discs = [self._disc(title, table, nodes)
                  for title, table in self.file.of_kind('Disk', 'Gear')]
         discs += self._point_masses(nodes)
         bearings = self._bearings(nodes)
+        if damping and damping['external_damping']['mass'] and any(
+                'pedestal' in bearing for bearing in bearings):
+            self.lost.append(f'parameters: alpha = {damping["external_damping"]["mass"]:g} of '
+                             'what stands below the bearings; of the rotor it is kept')
         self._note_strangers()
         low, high = self._speed_range(bearings) if speed_range_rpm is None else speed_range_rpm
         self.assumed += [
@@ -89,10 +94,32 @@ class _Importer:
             'unbalances: none, a saved rotor has none']
         content = {
             'name': _name(self.file.path.stem, set()), 'support': {'model': 'rigid'},
-            'rotor': {'shaft_height': _SHAFT_HEIGHT, 'shaft': shaft, 'discs': discs,
+            'rotor': {'shaft_height': _SHAFT_HEIGHT, **damping, 'shaft': shaft, 'discs': discs,
                       'bearings': bearings},
             'unbalances': [], 'speed_range_rpm': [low, high]}
         return Imported(content, self.assumed, self.lost)
+
+    @property
+    def _reader(self) -> CoefficientReader:
+        return CoefficientReader(self.file, self.assumed, self.lost)
+
+    def _damping(self, shaft: list[dict[str, Any]]) -> dict[str, Any]:
+        """
+        Return the damping of the whole rotor; that of the pieces then counts for nothing.
+
+        So ROSS has it, which takes what is given for the rotor, else for its elements.
+        """
+        parameters = self.file.tables.get('parameters')
+        given = parameters if isinstance(parameters, dict) else {}
+        alpha, beta = (self.file.number('parameters', given, key, 0.0)
+                       for key in ('alpha', 'beta'))
+        if alpha == beta == 0.0:
+            return {}
+        for piece in shaft:
+            if piece.pop('external_damping', None) is not None:
+                self.lost.append('alpha and beta of shaft elements, beside those of the whole '
+                                 'rotor, which ROSS takes alone')
+        return {'external_damping': {'mass': alpha, 'stiffness': beta}}
 
     def _disc(self, title: str, table: Table, nodes: Mapping[int, float]) -> dict[str, Any]:
         if title.startswith('Gear'):
@@ -135,9 +162,7 @@ class _Importer:
         for title, table in on_shaft:
             bearing = {'name': self._station(title, table),
                        'position': self._place(title, table, nodes),
-                       'stiffness': self._matrix(title, table, 'k', 'N/m'),
-                       'damping': self._matrix(title, table, 'c', 'N s/m')}
-            self._note_coefficients(title, table)
+                       **self._reader.read(title, table)}
             pedestal = self._pedestal(title, table, below, masses)
             if pedestal is not None:
                 bearing['pedestal'] = pedestal
@@ -162,18 +187,17 @@ class _Importer:
             self.lost.append(f'{title}: n_link = {shown(link)}, where nothing stands')
             return None
         support_title, support = supports[0]
-        stiffness = self._matrix(support_title, support, 'k', 'N/m')
-        damping = self._matrix(support_title, support, 'c', 'N s/m')
-        if 'speed_rpm' in stiffness or 'speed_rpm' in damping:
+        below.remove(supports[0])
+        held = self._reader.read(support_title, support)
+        if any('speed_rpm' in matrix for matrix in held.values()):
             self.lost.append(f'{support_title}: a pedestal with a table over speed; {title} '
                              'stands on rigid ground instead')
-            below.remove(supports[0])
             return None
-        below.remove(supports[0])
-        self._note_coefficients(support_title, support)
+        if held.pop('inertia', None) is not None:
+            self.lost.append(f'{support_title}: inertia of a pedestal')
         if support.get('n_link') is not None:
             self.lost.append(f'{support_title}: n_link, a second support below the first')
-        return {'mass': self._mass_at(link, masses), 'stiffness': stiffness, 'damping': damping}
+        return {'mass': self._mass_at(link, masses), **held}
 
     def _mass_at(self, node: object, masses: list[tuple[str, Table]]) -> dict[str, float]:
         total = {'xx': 0.0, 'zz': 0.0}
@@ -183,63 +207,13 @@ class _Importer:
             masses.remove(one)
         return total
 
-    def _matrix(self, title: str, table: Table, letter: str, unit: str) -> dict[str, Any]:
-        """Return stiffness or damping over our axes, as constants or as a table over speed."""
-        columns = {ours: [sign * value + 0.0 for value in self._column(
-                              title, table, f'{letter}{theirs}', unit)]
-                   for ours, theirs, sign in _DIRECTIONS}
-        newer = self.file.major >= 3 and table.get('frequency') is None
-        axis = 'speed' if newer or table.get('speed') is not None else 'frequency'
-        if all(len(set(column)) == 1 for column in columns.values()):
-            return {key: column[0] for key, column in columns.items()
-                    if key in ('xx', 'zz') or column[0] != 0.0}
-        if table.get(axis) is None:
-            raise self.file.error(f'{title}.{axis}', 'is missing, in rad/s; the coefficients '
-                                                     'are a table')
-        self._note_axis(title, axis)
-        speeds = self.file.numbers(title, table, axis, 'rad/s')
-        count = len(speeds)
-        for key, column in columns.items():
-            if len(column) == 1:
-                columns[key] = column * count
-            elif len(column) != count:
-                raise self.file.error(title, f'must have as many coefficients as {axis}, '
-                                             f'{count}, got {len(column)}')
-        return {'speed_rpm': [rad_s_to_rpm(value) for value in speeds],
-                **{key: column for key, column in columns.items()
-                   if key in ('xx', 'zz') or any(column)}}
-
-    def _column(self, title: str, table: Table, key: str, unit: str) -> list[float]:
-        if key not in table and key[1:] in ('xy', 'yx'):
-            return [0.0]
-        given = table.get(key)
-        if isinstance(given, list) and any(isinstance(row, list) for row in given):
-            raise self.file.error(f'{title}.{key}', 'is a table over speed and frequency; a case '
-                                                    'takes coefficients over the speed alone')
-        return self.file.numbers(title, table, key, unit)
-
-    def _note_axis(self, title: str, axis: str) -> None:
-        """Say that a file which knows both axes means another one than the speed."""
-        if axis == 'frequency' and self.file.major >= 3:
-            note = (f'{title}: its table is over the frequency of the vibration; it is taken over '
-                    'the speed, which is the same for unbalance only')
-            if note not in self.lost:
-                self.lost.append(note)
-
-    def _note_coefficients(self, title: str, table: Table) -> None:
-        for key in _OTHER_COEFFICIENTS:
-            if key in table and any(self._column(title, table, key, 'SI')):
-                self.lost.append(f'{title}: {key} = {shown(table[key])}')
-        if table.get('interpolation', 'pchip') != 'pchip':
-            self.lost.append(f'{title}: interpolation = {shown(table["interpolation"])}; ours is '
-                             'pchip')
-        if not re.match(r'(Bearing|Seal)Element', title):
-            self.lost.append(f'{title}: its geometry; its coefficients are kept')
-
     def _speed_range(self, bearings: Sequence[Table]) -> tuple[float, float]:
-        tables = [matrix['speed_rpm'] for bearing in bearings
-                  for matrix in (bearing['stiffness'], bearing['damping'])
-                  if 'speed_rpm' in matrix]
+        matrices = [bearing[key] for bearing in bearings
+                    for key in ('stiffness', 'damping', 'inertia') if key in bearing]
+        tables = [matrix['speed_rpm'] for matrix in matrices if 'speed_rpm' in matrix]
+        # Unbalance vibrates with the frequency of the speed.
+        tables += [[rad_s_to_rpm(hz_to_rad_s(one)) for one in matrix['frequency_hz']]
+                   for matrix in matrices if 'frequency_hz' in matrix]
         low = max((table[0] for table in tables), default=_SPEED_RANGE_RPM[0])
         high = min((table[-1] for table in tables), default=_SPEED_RANGE_RPM[1])
         self.assumed.append(f'speed_range_rpm: {low:g} to {high:g}'
@@ -260,7 +234,7 @@ class _Importer:
     def _note_parameters(self, table: Table) -> None:
         """Note what holds for the whole model, where it is not nothing."""
         for key, value in table.items():
-            if value and key not in _OF_A_RUN:
+            if value and key not in (*_OF_A_RUN, *_DAMPING):
                 self.lost.append(f'parameters: {one_line(key)} = {shown(value)}')
 
     def _place(self, title: str, table: Table, nodes: Mapping[int, float]) -> float:

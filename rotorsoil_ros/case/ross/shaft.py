@@ -11,6 +11,8 @@ from rotorsoil_ros.case.ross.file import RossFile, Table
 
 _SAME = 1e-12
 _TOUCHING = 1e-9
+# What loads and damps a piece, where anything does.
+_LOADS = ('axial_force', 'torque', 'external_damping')
 # What our shaft always has.
 _SHAFT_EFFECTS = ('shear_effects', 'rotary_inertia', 'gyroscopic')
 
@@ -82,15 +84,23 @@ class ShaftReader:
                                  'outer_diameter': outer, 'inner_diameter': inner}
         if ends != (outer, inner):
             piece['outer_diameter_end'], piece['inner_diameter_end'] = ends
-        return {**piece, 'elements': 1, 'material': self._material(title, table)}
+        return {**piece, 'elements': 1, 'material': self._material(title, table),
+                **self._loads(title, table)}
+
+    def _loads(self, title: str, table: Table) -> dict[str, Any]:
+        """Return what loads and damps a piece, where anything does."""
+        found: dict[str, Any] = {
+            key: value for key in ('axial_force', 'torque')
+            if (value := self.file.number(title, table, key, 0.0)) != 0.0}
+        alpha, beta = (self.file.number(title, table, key, 0.0) for key in ('alpha', 'beta'))
+        if alpha != 0.0 or beta != 0.0:
+            found['external_damping'] = {'mass': alpha, 'stiffness': beta}
+        return found
 
     def _note_effects(self, title: str, table: Table) -> None:
         for key in _SHAFT_EFFECTS:
             if not table.get(key, True):
                 self.lost.append(f'{title}: {key} = false; our shaft always has them')
-        for key in ('axial_force', 'torque', 'alpha', 'beta'):
-            if self.file.number(title, table, key, 0.0) != 0.0:
-                self.lost.append(f'{title}: {key} = {table[key]:g}')
         method = table.get('shear_method_calc', 'cowper')
         if method != 'cowper':
             self.lost.append(f'{title}: shear_method_calc = {shown(method)}; ours is cowper')
@@ -103,6 +113,9 @@ class ShaftReader:
         """
         for title, table in layers:
             layer = self._piece(title, table)
+            for key in _LOADS:
+                if key in layer:
+                    self.lost.append(f'{title}: {key} of a second layer, {shown(layer[key])}')
             if _is_one_body(piece, layer):
                 outer, end = _ends(layer, 'outer')
                 piece['outer_diameter'] = outer
@@ -169,5 +182,5 @@ def _alike(section: Mapping[str, Any], piece: Mapping[str, Any]) -> bool:
         return False
     each = section['length'] / section['elements']
     same = all(section.get(key) == piece.get(key) for key in (
-        'outer_diameter', 'inner_diameter', 'material', 'added_mass'))
+        'outer_diameter', 'inner_diameter', 'material', 'added_mass', *_LOADS))
     return same and abs(each - piece['length']) <= _SAME * each

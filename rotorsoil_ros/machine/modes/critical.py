@@ -54,6 +54,8 @@ class CriticalSpeed:
     deflection : (k, 2) complex array
         Its shape over (x, z) of the rotor's nodes, the largest amplitude being one; where the
         rotor stays still, that of the support is.
+    slope : (k, 2) complex array
+        Of the shaft in the same shape, in the planes of x and z.
     support : (s,) complex array
         Motion of the support in the same shape, over (x, y, z, rx, ry, rz) of each block, then
         the deflections of pedestals.
@@ -64,6 +66,7 @@ class CriticalSpeed:
     whirl: int
     damping_ratio: float
     deflection: ComplexArray
+    slope: ComplexArray
     support: ComplexArray
 
     @property
@@ -143,7 +146,7 @@ def critical_speeds(
     if not 0.0 <= low < high < math.inf:
         raise RotorSoilError(f'speed range must be 0 <= low < high in rad/s, got {low:g} to '
                              f'{high:g}')
-    solver = SpectrumSolver.up_to(model, _ABOVE * high)
+    solver = SpectrumSolver.up_to(model, _ABOVE * high, following=True)
     # What there is to be solved for grows with the cube of them.
     if int((solver.basis.mass * high**2 > 1.0).sum()) > _MOST_SLOW:
         raise NotSolvedError(
@@ -246,10 +249,10 @@ def _critical(
     solver: SpectrumSolver, found: Spectrum, speed: float, row: int, mode: int,
 ) -> CriticalSpeed:
     frequency, support = found.frequency[row, mode], found.support[row, mode]
-    deflection = solver.deflection(found.rotor[row, mode])
+    deflection, slope = solver.bent(found.rotor[row, mode])
     largest = np.abs(deflection).max()
     if not largest > _STILL * np.abs(support).max(initial=0.0):
         largest = np.abs(support).max()
     return CriticalSpeed(speed, int(found.whirl[row, mode]),
                          float(frequency.imag / np.abs(frequency)),
-                         deflection / largest, support / largest)
+                         deflection / largest, slope / largest, support / largest)

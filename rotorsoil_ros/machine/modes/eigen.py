@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.rational import Continuation
 from rotorsoil_ros.rotor.whirl import ORBITS
 
@@ -40,12 +40,12 @@ class FreeVibration:
 
     Attributes
     ----------
-    inverse : (n, 2 r) float array
-        1 / omega of the rotor's forward whirl modes on nominal springs [s].
-    journals : (n, b, 2 r) float array
-        Their deflection at the bearings.
-    stiffness, damping : (n, 2 b, 2 b) float array
-        Of the bearings over (x, z) of each.
+    inverse : (n, 2, 2 r) float or complex array
+        1 / w of the rotor's forward and backward whirl modes on nominal springs [s].
+    journals, driven : (n, 2, b, 2 r) float or complex arrays
+        Their deflection at the bearings, and how much forces there drive them.
+    bearings : three (n, 2 b, 2 b) complex arrays
+        The series of `Bearings.series`, a + w b - w^2 c over (x, z) of each.
     rows : (2 b, s) float array
         Housing motion per motion of the support.
     mass : (s, s) float array
@@ -56,51 +56,67 @@ class FreeVibration:
         Frequency up to which modes are looked for [rad/s].
     reach : float
         Rotor modes up to this many times `highest` are unknowns of their own.
-    within : tuple of two floats
-        Frequencies between which the compliance holds [rad/s].
+    within : tuple of two (n,) float arrays
+        Frequencies between which all this holds [rad/s].
 
     """
 
-    inverse: FloatArray
-    journals: FloatArray
-    stiffness: FloatArray
-    damping: FloatArray
+    inverse: AnyArray
+    journals: AnyArray
+    driven: AnyArray
+    bearings: tuple[ComplexArray, ComplexArray, ComplexArray]
     rows: FloatArray
     mass: FloatArray
     compliance: Continuation
     highest: float
     reach: float
-    within: tuple[float, float]
+    within: tuple[FloatArray, FloatArray]
 
     @cached_property
-    def _modes(self) -> tuple[FloatArray, ComplexArray]:
-        """Inverse frequencies (n, m) and journal orbits (n, 2 b, m), forward then backward."""
-        both = np.concatenate([self.inverse, -self.inverse], axis=1)
-        orbits = np.concatenate([self.journals[:, :, None] * orbit[:, None]
-                                 for orbit in ORBITS], axis=-1)
-        return both, orbits.reshape(len(both), -1, both.shape[1])
+    def _modes(self) -> tuple[AnyArray, ComplexArray, ComplexArray]:
+        """
+        Return all whirl modes, forward then backward.
+
+        Inverse frequencies (n, m), orbits of the journals (n, 2 b, m), and how much forces there
+        drive each (n, m, 2 b).
+        """
+        count = len(self.inverse)
+        orbits, driven = (
+            np.moveaxis(own[:, :, :, None] * turn[None, :, None, :, None], 1, 3)
+            .reshape(count, len(self.rows), -1)
+            for own, turn in ((self.journals, ORBITS), (self.driven, ORBITS.conj())))
+        return self.inverse.reshape(count, -1), orbits, driven.transpose(0, 2, 1)
+
+    @cached_property
+    def _slowness(self) -> FloatArray:
+        """How long each takes, (n, m) [s]; negative of what does not swing the right way."""
+        inverse, _, _ = self._modes
+        size = np.abs(inverse)
+        return np.where(inverse.real > -_CREEPING * size, size, -size)
 
     @cached_property
     def resonant(self) -> IntArray:
         """Rotor modes that may resonate, (n, k): they are unknowns of their own."""
-        inverse, _ = self._modes
-        count = int((inverse * self.highest * self.reach > 1.0).sum(axis=1).max())
-        return np.argsort(-inverse, axis=1)[:, :count]
+        count = int((self._slowness * self.highest * self.reach > 1.0).sum(axis=1).max())
+        return np.argsort(-self._slowness, axis=1)[:, :count]
 
-    def _pick(self, modes: IntArray) -> tuple[FloatArray, ComplexArray]:
-        inverse, orbits = self._modes
+    def _pick(
+        self, modes: IntArray,
+    ) -> tuple[AnyArray, ComplexArray, ComplexArray]:
+        inverse, orbits, driven = self._modes
         return (np.take_along_axis(inverse, modes, axis=1),
-                np.take_along_axis(orbits, modes[:, None], axis=2))
+                np.take_along_axis(orbits, modes[:, None], axis=2),
+                np.take_along_axis(driven, modes[:, :, None], axis=1))
 
     @cached_property
     def _residues(self) -> ComplexArray:
-        _, orbits = self._modes
-        pairs = orbits[:, :, None] * orbits[:, None].conj()
-        return pairs.reshape(len(pairs), -1, orbits.shape[2]).transpose(0, 2, 1)
+        _, orbits, driven = self._modes
+        pairs = orbits.transpose(0, 2, 1)[..., None] * driven[:, :, None]
+        return pairs.reshape(*pairs.shape[:2], -1)
 
     def _gains(self, frequency: ComplexArray) -> ComplexArray:
         """Return 1 / (1 - w / omega_k) of modes that cannot resonate, else 0, (n, p, m)."""
-        inverse, _ = self._modes
+        inverse, _, _ = self._modes
         stiffness = 1.0 - frequency[..., None] * inverse[:, None]
         np.put_along_axis(stiffness, self.resonant[:, None], np.inf, axis=2)
         return np.asarray(1.0 / stiffness)
@@ -127,13 +143,14 @@ class FreeVibration:
             of resonant rotor modes, and the motion z of the support.
 
         """
-        inverse, orbits = self._pick(self.resonant)
+        inverse, orbits, driven = self._pick(self.resonant)
         _, ports, modes = orbits.shape
         own = len(self.mass)
         w = frequency[..., None, None]
         one = np.eye(ports)
         regular = self._regular(frequency)
-        extra = self.stiffness[:, None] + 1j * w * self.damping[:, None] - one
+        constant, rate, inertia = (part[:, None] for part in self.bearings)
+        extra = constant + w * rate - w**2 * inertia - one
         compliance = self.compliance(frequency)
         # Gap between journal and housing, over the unknowns.
         gap = np.concatenate([
@@ -143,10 +160,10 @@ class FreeVibration:
         force, mode = slice(0, ports), slice(ports, ports + modes)
         modal, motion = range(ports, ports + modes), slice(ports + modes, None)
         total = np.zeros((*frequency.shape, gap.shape[-1], gap.shape[-1]), dtype=complex)
-        # Bearings g = (Z - 1) gap; modes (1 - w / omega_k) p = -S^H (g - Y z); support
+        # Bearings g = (Z - 1) gap; modes (1 - w / w_k) p = -S (g - Y z), S driven; support
         # z = N (Y^T (g + gap) + w^2 M z), where the compliance N may be zero.
         total[..., force, :] = np.eye(ports, gap.shape[-1]) - extra @ gap
-        total[..., mode, force] = orbits.conj().transpose(0, 2, 1)[:, None]
+        total[..., mode, force] = driven[:, None]
         total[..., modal, modal] = 1.0 - frequency[..., None] * inverse[:, None]
         total[..., mode, motion] = -total[..., mode, force] @ self.rows
         total[..., motion, :] = -(compliance @ self.rows.T) @ through
@@ -162,13 +179,14 @@ class FreeVibration:
         (w - poles)^-1 right with its states as unknowns.
         """
         slow, static, first, second = self._slow
-        inverse, orbits = self._pick(slow)
+        inverse, orbits, driven = self._pick(slow)
+        constant, linear, inertia = self.bearings
         length, ports, modes = orbits.shape
-        own = len(self.mass)
+        own, heavy = len(self.mass), ports if inertia.any() else 0
         soil_states = self.compliance.states(_ROUGH)
-        sizes = (ports, modes, own, own, len(soil_states.poles), own, ports)
+        sizes = (ports, modes, own, own, len(soil_states.poles), own, ports, heavy)
         ends = np.cumsum(sizes)
-        force, mode, motion, load, soil, rate, gap = (
+        force, mode, motion, load, soil, rate, gap, swing = (
             slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
         modal = range(mode.start, mode.stop)
         a = np.zeros((length, ends[-1], ends[-1]), dtype=complex)
@@ -176,9 +194,10 @@ class FreeVibration:
         middle = 0.25 * self.highest
         # Each block of rows in the order of the unknowns.
         a[:, force, force] = np.eye(ports)
-        a[:, force, gap] = np.eye(ports) - self.stiffness
-        b[:, force, gap] = 1j * self.damping
-        a[:, mode, force], a[:, modal, modal] = orbits.conj().transpose(0, 2, 1), 1.0
+        a[:, force, gap], b[:, force, gap] = np.eye(ports) - constant, linear
+        b[:, force, swing] = -middle * inertia[..., :heavy]
+        a[:, swing, swing], b[:, swing, gap] = np.eye(heavy), np.eye(heavy, ports) / middle
+        a[:, mode, force], a[:, modal, modal] = driven, 1.0
         a[:, mode, motion] = -a[:, mode, force] @ self.rows
         b[:, modal, modal] = inverse
         a[:, motion, motion], a[:, motion, load] = np.eye(own), -soil_states.constant
@@ -197,11 +216,11 @@ class FreeVibration:
     @cached_property
     def _slow(self) -> tuple[IntArray, ComplexArray, ComplexArray, ComplexArray]:
         """Modes that are slow in either sense, (n, 2 k), and what others do, (n, 2 b, 2 b)."""
-        inverse, _ = self._modes
+        inverse, _, _ = self._modes
         count, ports = self.resonant.shape[1], len(self.rows)
-        order = np.argsort(-inverse, axis=1)
+        order = np.argsort(-self._slowness, axis=1)
         slow = np.concatenate([self.resonant, order[:, order.shape[1] - count:]], axis=1)
-        others = np.ones_like(inverse)
+        others = np.ones(inverse.shape)
         np.put_along_axis(others, slow, 0.0, axis=1)
         powers = others[:, None] * inverse[:, None] ** np.arange(3)[:, None]
         moments = (powers @ self._residues).reshape(-1, 3, ports, ports)
@@ -228,7 +247,7 @@ class FreeVibration:
         values, vectors = np.linalg.eig(spread[:, memory])
         values = np.where(np.abs(values) * self.highest < 1e-6, 1e-6 / self.highest, values)
         frequency = centre + 1.0 / values
-        low, high = self.within
+        low, high = (end[:, None] for end in self.within)
         keep = (vibrates(frequency) & (np.abs(frequency) < 2.0 * self.highest)
                 & (frequency.real > (1.0 - _ASIDE) * low)
                 & (frequency.real < (1.0 + _ASIDE) * high))
@@ -297,10 +316,10 @@ class FreeVibration:
 
     def amplitudes(self, frequency: ComplexArray, vector: ComplexArray) -> ComplexArray:
         """Return the amplitudes of all rotor modes, forward then backward, (n, p, m)."""
-        _, orbits = self._modes
+        _, _, driven = self._modes
         ports, modes = len(self.rows), self.resonant.shape[1]
         load = vector[..., ports + modes:] @ self.rows.T - vector[..., :ports]
-        forced = self._gains(frequency) * (load @ orbits.conj())
+        forced = self._gains(frequency) * (load @ driven.transpose(0, 2, 1))
         np.put_along_axis(forced, self.resonant[:, None],
                           vector[..., ports:ports + modes], axis=2)
         return forced

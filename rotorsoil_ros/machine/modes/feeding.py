@@ -1,4 +1,4 @@
-"""What can feed a vibration: bearings and pedestals that give energy, and how fast at most."""
+"""What can feed a vibration: bearings, pedestals and the shaft, and how fast at most."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,7 +11,9 @@ import scipy.linalg
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
-from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
+from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.rotor.coefficients import Coefficients, FrequencyTable, SpeedTable, tables
+from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.whirl import held
 
 # Cross terms that differ by less than this share of all coefficients are symmetric.
@@ -23,7 +25,11 @@ _ARTEFACT = 1e-3
 # Share of the largest 1 / omega^2 below which a mode of the mesh has no mass.
 _MASSLESS = 1e-13
 
-CAUSES = ('cross-coupled stiffness', 'negative damping', 'negative stiffness')
+# What may feed a vibration: coefficients of a bearing, then what the shaft does by itself.
+CROSS, NEGATIVE_DAMPING, NEGATIVE_STIFFNESS, ADDED_MASS = (
+    'cross-coupled stiffness', 'negative damping', 'negative stiffness', 'added mass')
+_OF_SHAFT = 'internal damping', 'external damping', 'torque'
+_OF_BEARING = CROSS, NEGATIVE_DAMPING, NEGATIVE_STIFFNESS, ADDED_MASS
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +82,27 @@ def highest_fed(model: CoupledModel, span: tuple[float, float]) -> float:
     terms. With s > 0 a bearing can only balance it while |l| c < |q| + max(-k, 0).
 
     """
-    highest = 0.0
-    for stiffness, damping in _of_everything(model, span):
+    highest = _of_shaft(model, span[1])
+    for stiffness, damping, inertia in _of_everything(model, span):
         lowest = damping.lowest_eigenvalue
         gives = stiffness.skew + max(-stiffness.lowest_eigenvalue, 0.0)
+        if inertia.skew > 0.0 or inertia.lowest_eigenvalue < 0.0:
+            return math.inf
         if gives > 0.0 or lowest < 0.0:
             highest = max(highest, gives / lowest if lowest > 0.0 else math.inf)
     return highest
+
+
+def _of_shaft(model: CoupledModel, fastest_speed: float) -> float:
+    """Return below which |lambda| a growing vibration lies that the shaft feeds [rad/s]."""
+    losses = model.rotor.losses
+    if losses is None:
+        return 0.0
+    if losses.torsion.any():
+        return math.inf
+    # Material feeds a whirl that is slower than the rotor; it grows by its loss factor at most.
+    return (1.0 + float(losses.is_hysteretic)) * fastest_speed * bool(
+        losses.viscous.any() or losses.is_hysteretic)
 
 
 def fastest(model: CoupledModel) -> float:
@@ -94,23 +114,26 @@ def fastest(model: CoupledModel) -> float:
 
 def _of_everything(
     model: CoupledModel, span: tuple[float, float],
-) -> Iterator[tuple[_Range, _Range]]:
+) -> Iterator[tuple[_Range, _Range, _Range]]:
+    none = np.zeros((2, 2))
     for bearing in model.rotor.bearings:
-        yield from _of_bearing(bearing, span)
+        points = np.sort(np.concatenate([np.array(span), knots(bearing, span)]))
+        for left, right in pairwise(points.tolist()):
+            stiffness, damping, inertia = (_between(matrix, left, right)
+                                           for matrix in bearing.matrices)
+            yield stiffness, damping, inertia
         if bearing.pedestal is not None:
-            stiffness, damping = bearing.pedestal.stiffness, bearing.pedestal.damping
-            yield _Range(stiffness, stiffness), _Range(damping, damping)
+            stiffness, damping = (_Range(matrix, matrix) for matrix in (
+                bearing.pedestal.stiffness, bearing.pedestal.damping))
+            yield stiffness, damping, _Range(none, none)
 
 
-def _of_bearing(
-    bearing: Bearing, span: tuple[float, float],
-) -> Iterator[tuple[_Range, _Range]]:
-    points = np.sort(np.concatenate([np.array(span), knots(bearing, span)]))
-    for left, right in pairwise(points.tolist()):
-        yield (_between(bearing.stiffness, left, right), _between(bearing.damping, left, right))
-
-
-def _between(matrix: FloatArray | SpeedTable, left: float, right: float) -> _Range:
+def _between(matrix: Coefficients, left: float, right: float) -> _Range:
+    if isinstance(matrix, FrequencyTable):
+        # Straight between its frequencies.
+        parts = [_between(part, left, right) for part in matrix.at]
+        return _Range(np.min([part.least for part in parts], axis=0),
+                      np.max([part.most for part in parts], axis=0))
     if not isinstance(matrix, SpeedTable):
         return _Range(matrix, matrix)
     # A monotone cubic stays between its points.
@@ -120,8 +143,7 @@ def _between(matrix: FloatArray | SpeedTable, left: float, right: float) -> _Ran
 
 def knots(bearing: Bearing, span: tuple[float, float]) -> FloatArray:
     """Return the speeds inside a span at which tables of a bearing have points [rad/s]."""
-    own = [matrix.speed for matrix in (bearing.stiffness, bearing.damping)
-           if isinstance(matrix, SpeedTable)]
+    own = [table.speed for matrix in bearing.matrices for table in tables(matrix)]
     speeds = np.unique(np.concatenate([np.zeros(0), *own]))
     return speeds[(speeds > span[0]) & (speeds < span[1])]
 
@@ -129,16 +151,16 @@ def knots(bearing: Bearing, span: tuple[float, float]) -> FloatArray:
 @dataclass(frozen=True, slots=True)
 class Feed:
     """
-    What one bearing or pedestal gives to a vibration.
+    What one bearing, pedestal or the shaft gives to a vibration.
 
     Attributes
     ----------
     name : str
-        Of the bearing, or `pedestal of` it.
+        Of the bearing, or `the pedestal of` it, or `the shaft`.
     share : float
         Of all that is given [-].
     cause : str
-        One of `CAUSES`.
+        What of it gives: one of the words of this room.
 
     """
 
@@ -150,26 +172,32 @@ class Feed:
 def feeds(pencil: Pencil, vibrations: Vibrations, index: int) -> tuple[Feed, ...]:
     """Return what gives energy to a vibration, most first; nothing if its soil seems to."""
     w = complex(vibrations.frequency[index])
+    pencil = pencil.where(vibrations.speed, w)
     rotor, support, load = (pencil.part(vibrations, index, name)
                             for name in ('rotor', 'support', 'load'))
     gap = pencil.journals @ rotor - pencil.rows @ support
-    stiffness, rates = (part[0] for part in pencil.springs(np.array([vibrations.speed])))
-    damping = (rates / (1j * pencil.unit)).real
-    blocks = 6 * len(pencil.model.foundations)
-    terms = [(bearing.name, _taken(w, gap[pair], stiffness.real[pair, pair], damping[pair, pair]))
-             for bearing, pair in zip(pencil.model.rotor.bearings, _pairs(0), strict=False)]
+    model, blocks = pencil.model, 6 * len(pencil.model.foundations)
+    terms: list[tuple[str, tuple[str, ...], FloatArray]] = [
+        (bearing.name, _OF_BEARING, _taken(w, gap[pair], bearing, vibrations.speed) / spring)
+        for bearing, spring, pair in zip(model.rotor.bearings, model.nominal_springs.tolist(),
+                                         _pairs(0), strict=False)]
     deflection = support * pencil.compliance.size
-    terms += [(f'the pedestal of {bearing.name}',
-               _taken(w, deflection[pair], bearing.pedestal.stiffness, bearing.pedestal.damping))
-              for bearing, pair in zip((one for one in pencil.model.rotor.bearings
-                                        if one.pedestal is not None), _pairs(blocks),
-                                       strict=False) if bearing.pedestal is not None]
+    terms += [(f'the pedestal of {bearing.name}', _OF_BEARING, _passive(
+        w, deflection[pair], bearing.pedestal.stiffness, bearing.pedestal.damping))
+        for bearing, pair in zip((one for one in model.rotor.bearings
+                                  if one.pedestal is not None), _pairs(blocks), strict=False)
+        if bearing.pedestal is not None]
+    if (losses := pencil.solver.basis.losses) is not None:
+        own = [(motion.conj() * losses.exerted(
+            way, motion[None], w=np.array([w]), speed=np.array([vibrations.speed]))[:, 0])
+            for way, motion in zip(WHIRL_DIRECTIONS, rotor.reshape(2, -1), strict=True)]
+        terms.append(('the shaft', _OF_SHAFT, (np.conj(1j * w) * np.sum(own, axis=(0, 2))).real))
     soil = float((np.conj(1j * w) * np.vdot(support[:blocks], load[:blocks])).real)
-    total = sum(float(np.abs(taken).sum()) for _, taken in terms)
+    total = sum(float(np.abs(taken).sum()) for _, _, taken in terms)
     if not total > 0.0 or soil < -_ARTEFACT * (total + abs(soil)):
         return ()
-    given = [(name, -float(taken.sum()), CAUSES[int(taken.argmin())])
-             for name, taken in terms if taken.sum() < 0.0]
+    given = [(name, -float(taken.sum()), causes[int(taken.argmin())])
+             for name, causes, taken in terms if taken.sum() < 0.0]
     whole = sum(power for _, power, _ in given)
     return tuple(Feed(name, power / whole, cause) for name, power, cause
                  in sorted(given, key=lambda one: -one[1]))
@@ -182,7 +210,17 @@ def _pairs(first: int) -> Iterator[slice]:
         place += 2
 
 
-def _taken(
+def _taken(w: complex, gap: ComplexArray, bearing: Bearing, speed: float) -> FloatArray:
+    """Return what a bearing takes of a vibration exp(i w t) by each of its causes, (4,)."""
+    omega = np.clip(np.array([w.real]), *bearing.frequency_range)
+    stiffness, damping, inertia = (
+        part[0] for part in bearing.coefficients(np.array([speed]), omega))
+    # Of the force -w^2 M u.
+    heavy = (np.conj(1j * w) * np.vdot(gap, -w**2 * inertia @ gap)).real
+    return np.append(_passive(w, gap, stiffness, damping), heavy)
+
+
+def _passive(
     w: complex, gap: ComplexArray, stiffness: FloatArray, damping: FloatArray,
 ) -> FloatArray:
     """Return what cross-coupling, damping and stiffness take of a vibration exp(i w t), (3,)."""

@@ -77,7 +77,7 @@ class ModeNames:
         """
         energies = self._in_soil(support, frequency) | self._in_pedestals(support)
         energies['shaft'] = float(np.vdot(deflection, self._bending @ deflection).real)
-        energies['bearings'] = self._in_bearings(deflection, support, speed)
+        energies['bearings'] = self._in_bearings(deflection, support, speed, frequency)
         # All springs of one block together, so that coupled sliding and rocking are one body.
         bodies: dict[str, float] = {}
         for place, energy in energies.items():
@@ -126,12 +126,13 @@ class ModeNames:
         return found
 
     def _in_bearings(
-        self, deflection: ComplexArray, support: ComplexArray, speed: float,
+        self, deflection: ComplexArray, support: ComplexArray, speed: float, frequency: float,
     ) -> float:
         rotor = self.model.rotor
         nodes = [rotor.node_of(bearing.position) for bearing in rotor.bearings]
         gap = deflection[nodes].ravel() - self.model.support.motion_rows @ support
-        stiffness, _ = self.model.bearing_coefficients(np.array([speed]))
+        stiffness, _, _ = self.model.bearings.coefficients(
+            np.array([speed]), np.clip([frequency], *self.model.bearings.frequency_range))
         return abs(float(np.vdot(gap, stiffness[0] @ gap).real))
 
     def _order(self, deflection: ComplexArray) -> str:

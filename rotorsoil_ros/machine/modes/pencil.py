@@ -2,14 +2,16 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-import math
 
 import numpy as np
+import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.rational import Continuation, States
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
+from rotorsoil_ros.machine.modes.zones import Zone
+from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.whirl import ORBITS
 
 # Poles of the soil that weigh less than this are noise of their fit: each would be a mode.
@@ -62,15 +64,15 @@ class Pencil:
     model : CoupledModel
         The machine.
     solver : SpectrumSolver
-        Its rotor in few coordinates, and the compliance of its support, continued by pieces.
-    piece : int
+        Its rotor in few coordinates, and the zones of frequency.
+    place : int
         Which of these this pencil is made of; `at` asks the others for what lies in theirs.
 
     """
 
     model: CoupledModel
     solver: SpectrumSolver
-    piece: int = 0
+    place: int = 0
 
     @classmethod
     def up_to(cls, model: CoupledModel, highest: float) -> 'Pencil':
@@ -78,21 +80,27 @@ class Pencil:
         return cls(model, SpectrumSolver.up_to(model, highest))
 
     @property
+    def zone(self) -> Zone:
+        """Frequencies in which this pencil holds."""
+        return self.solver.zones[self.place]
+
+    @property
     def compliance(self) -> Continuation:
         """Compliance of the support without its mass, where this pencil holds."""
-        return self.solver.pieces[self.piece]
+        return self.zone.compliance
 
     @cached_property
     def _all(self) -> tuple['Pencil', ...]:
-        """Pencils between all branch points of the soil."""
-        return tuple(replace(self, piece=piece) for piece in range(len(self.solver.pieces)))
+        """Pencils of all zones."""
+        return tuple(replace(self, place=place) for place in range(len(self.solver.zones)))
 
-    @cached_property
-    def _within(self) -> tuple[float, float]:
-        """Frequencies up to the next pencil's [rad/s]; what creeps belongs to the first."""
-        pieces = self.solver.pieces
-        return (-math.inf if self.piece == 0 else self.compliance.span[0],
-                math.inf if self.piece + 1 == len(pieces) else pieces[self.piece + 1].span[0])
+    def where(self, speed: float, w: complex) -> 'Pencil':
+        """Return the pencil in whose zone a vibration lies, at a rotor speed [rad/s]."""
+        def beyond(pencil: 'Pencil') -> float:
+            (low,), (high,) = pencil.zone.ends(pencil.zone.owned, np.array([speed]))
+            return max(float(low) - w.real, w.real - float(high), 0.0)
+
+        return min(self._all, key=beyond)
 
     @cached_property
     def _soil(self) -> States:
@@ -135,16 +143,16 @@ class Pencil:
         return {name: slice(end - size, end)
                 for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
-    def springs(self, speed: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return stiffness and i times damping per `unit` of the bearings, (n, 2 b, 2 b)."""
+    def springs(self, speed: FloatArray) -> ComplexArray:
+        """Return the terms a, b and c of `Bearings.series` in `unit`, (3, n, 2 b, 2 b)."""
         unit = np.repeat(np.sqrt(self.model.nominal_springs), 2)
-        stiffness, damping = self.model.bearing_coefficients(speed)
-        scale = unit[:, None] * unit
-        return stiffness / scale + 0j, 1j * self.unit * damping / scale
+        series = np.array(self.model.bearings.series(speed, self.zone.between))
+        powers = self.unit ** np.arange(3.0)[:, None, None, None]
+        return np.asarray(powers * series / (unit[:, None] * unit))
 
     @cached_property
     def _memory(self) -> ComplexArray:
-        """B, the same at every speed."""
+        """What of B the inertia of bearings does not make."""
         at, size = self.places, self.places['soil'].stop
         b = np.zeros((size, size), dtype=complex)
         rotor, rate = at['rotor'], at['rotor_rate']
@@ -162,6 +170,11 @@ class Pencil:
         a = np.zeros((size, size), dtype=complex)
         a[at['rotor'], at['rotor']] = (np.eye(self.journals.shape[1])
                                        - self.journals.conj().T @ self.journals)
+        if (losses := self.solver.basis.losses) is not None:
+            held = [losses.held(way, speed=0.0, lag=self.zone.lag) for way in WHIRL_DIRECTIONS]
+            rates = [self.unit * losses.rate(way) for way in WHIRL_DIRECTIONS]
+            a[at['rotor'], at['rotor']] += scipy.linalg.block_diag(*held)
+            a[at['rotor'], at['rotor_rate']] += scipy.linalg.block_diag(*rates)
         a[at['rotor_rate'], at['rotor_rate']] = self.unit * np.eye(self.journals.shape[1])
         a[at['load'], at['load']] = np.eye(len(self.mass))
         a[at['support_rate'], at['support_rate']] = self.unit * np.eye(len(self.mass))
@@ -179,34 +192,40 @@ class Pencil:
         at, polar = self.places, self.solver.basis.polar
         a = np.zeros_like(self._fixed)
         a[at['rotor'], at['rotor_rate']] = self.unit * np.kron(np.diag([1.0, -1.0]), polar)
+        if (losses := self.solver.basis.losses) is not None:
+            turning = [losses.turning(way) for way in WHIRL_DIRECTIONS]
+            a[at['rotor'], at['rotor']] = scipy.linalg.block_diag(*turning)
         return a
 
-    def _bearings(self, stiffness: ComplexArray, rates: ComplexArray) -> ComplexArray:
-        """Return what bearings of these coefficients, (n, 2 b, 2 b) each, make of A."""
+    def _bearings(self, series: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return what bearings of these terms, (3, n, 2 b, 2 b), make of A and of B."""
+        a, b = (np.zeros((series.shape[1], *self._fixed.shape), dtype=complex) for _ in range(2))
+        self._push(a, series[0], 'rotor', 'support')
+        self._push(a, series[1], 'rotor_rate', 'support_rate')
+        # w^2 times a motion is w times its rate.
+        self._push(b, series[2] / self.unit, 'rotor_rate', 'support_rate')
+        return a, b
+
+    def _push(self, matrix: ComplexArray, force: ComplexArray, *moves: str) -> None:
+        """Add forces between journals and housings, (n, 2 b, 2 b), that some motions exert."""
         at, gap = self.places, np.concatenate([self.journals, -self.rows], axis=1)
-        a = np.zeros((len(stiffness), *self._fixed.shape), dtype=complex)
-        for matrix, moves in ((stiffness, ('rotor', 'support')),
-                              (rates, ('rotor_rate', 'support_rate'))):
-            through = matrix @ gap
-            for place, columns in zip(moves, np.split(through, [self.journals.shape[1]], axis=2),
-                                      strict=True):
-                a[:, at['rotor'], at[place]] += self.journals.conj().T @ columns
-                a[:, at['load'], at[place]] -= self.rows.T @ columns
-        return a
+        columns = np.split(force @ gap, [self.journals.shape[1]], axis=2)
+        for place, own in zip(moves, columns, strict=True):
+            matrix[:, at['rotor'], at[place]] += self.journals.conj().T @ own
+            matrix[:, at['load'], at[place]] -= self.rows.T @ own
 
-    def _matrices(self, speed: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return A and its derivative by the speed, (n, d, d) each."""
+    def _matrices(self, speed: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Return A, B, and their derivatives by the speed as (A', B'), (n, d, d) each."""
         bearings = self.model.rotor.bearings
         low = max([0.0, *(bearing.speed_range[0] for bearing in bearings)])
         high = min(bearing.speed_range[1] for bearing in bearings)
         step = _STEP * max(float(speed.max()), self.unit)
         left, right = np.maximum(speed - step, low), np.minimum(speed + step, high)
-        before, after = self.springs(left), self.springs(right)
-        wide = (right - left)[:, None, None]
-        a = (self._fixed + speed[:, None, None] * self._turning
-             + self._bearings(*self.springs(speed)))
-        changes = [(late - early) / wide for early, late in zip(before, after, strict=True)]
-        return a, self._turning + self._bearings(changes[0], changes[1])
+        change = (self.springs(right) - self.springs(left)) / (right - left)[:, None, None]
+        a, b = self._bearings(self.springs(speed))
+        a_change, b_change = self._bearings(change)
+        return (self._fixed + speed[:, None, None] * self._turning + a, self._memory + b,
+                np.array([self._turning + a_change, b_change]))
 
     def at(self, speed: FloatArray) -> list[Vibrations]:
         """Return all vibrations at each of the speeds (n,) [rad/s]."""
@@ -217,24 +236,29 @@ class Pencil:
         return found
 
     def _at(self, speed: FloatArray) -> list[Vibrations]:
-        a, change = self._matrices(speed)
-        b = self._memory
-        memory = np.flatnonzero(b.any(axis=0))
+        a, b, (a_change, b_change) = self._matrices(speed)
+        memory = np.flatnonzero(b.any(axis=(0, 1)))
+        low, high = self.zone.ends(self.zone.owned, speed)
         centre = _CENTRE * self.solver.span[1]
-        right = np.concatenate([np.broadcast_to(b[:, memory], (*a.shape[:2], len(memory))),
-                                change], axis=2)
-        both = np.linalg.solve(a - centre * b, right)
-        spread, moved = both[..., :len(memory)], both[..., len(memory):]
+        size = len(memory)
+        heavier = [b_change] if b_change.any() else []
+        both = np.linalg.solve(a - centre * b, np.concatenate(
+            [b[..., memory], a_change, *heavier], axis=2))
+        spread, moved, *heavier = np.split(both, range(size, both.shape[2], a.shape[1]), axis=2)
         values, vectors = np.linalg.eig(spread[:, memory])
         full = spread @ vectors
-        along = -np.linalg.solve(vectors, moved[:, memory] @ full)
-        drift = along.diagonal(axis1=1, axis2=2)
+        # A y = w B y: w' = left (A' - w B') y / left B y, and 1 / (w - centre) are the values.
+        pushed = moved[:, memory] @ full
+        for one in heavier:
+            w = centre + 1.0 / np.where(values == 0.0, np.inf, values)
+            pushed -= one[:, memory] @ (full * w[:, None])
+        drift = -np.linalg.solve(vectors, pushed).diagonal(axis1=1, axis2=2)
         found = []
         for row, place in enumerate(speed.tolist()):
             own = np.abs(values[row]) * self.solver.span[1] > 1e-9
             inverse = values[row, own]
             frequency = centre + 1.0 / inverse
-            kept = (frequency.real >= self._within[0]) & (frequency.real < self._within[1])
+            kept = (frequency.real >= low[row]) & (frequency.real < high[row])
             # States of the soil differ from piece to piece, and nobody asks for them.
             shapes = full[row][:self.places['soil'].start, own]
             found.append(Vibrations(place, frequency[kept],

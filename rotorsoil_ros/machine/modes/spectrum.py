@@ -1,19 +1,22 @@
 """How the machine vibrates on its own, at any speed."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 import math
 
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
 from rotorsoil_ros.ground.rational import Continuation
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
-from rotorsoil_ros.rotor.reduced import ReducedRotor
+from rotorsoil_ros.machine.modes.zones import Zone, zones_of
+from rotorsoil_ros.rotor.losses import Losses, WHIRL_DIRECTIONS
+from rotorsoil_ros.rotor.reduced import ReducedRotor, Whirls
 from rotorsoil_ros.rotor.whirl import held, ORBITS
-from rotorsoil_ros.units import rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # A shaft at rest whirls in no direction; one that creeps, relative to its lowest mode, does.
 _CREEP = 1e-9
@@ -88,6 +91,9 @@ class SpectrumSolver:
         Compliance of the support without its mass, between the branch points of the soil.
     span : tuple of two floats
         Frequencies between which modes are looked for [rad/s].
+    following : bool
+        Whether only what has the frequency of the speed is wanted: no hysteresis of the shaft is
+        felt in forward whirl then, as it stands still in the rotor.
 
     """
 
@@ -95,10 +101,12 @@ class SpectrumSolver:
     basis: ReducedRotor
     pieces: tuple[Continuation, ...]
     span: tuple[float, float]
+    following: bool = False
 
     @classmethod
     def up_to(
         cls, model: CoupledModel, highest: float, *, shapes: int = _MORE_SHAPES,
+        following: bool = False,
     ) -> 'SpectrumSolver':
         """
         Prepare for modes up to a frequency, as far as the soil is known.
@@ -111,6 +119,8 @@ class SpectrumSolver:
             Frequency [rad/s].
         shapes : int
             Least number of modes at rest that span the rotor's shapes.
+        following : bool
+            As of the solver.
 
         """
         while True:
@@ -119,8 +129,22 @@ class SpectrumSolver:
             if shapes >= slow + _MORE_SHAPES or shapes >= len(basis.shapes):
                 break
             shapes = slow + _MORE_SHAPES
-        low, high = model.support.known(highest)
-        return cls(model, basis, model.support.continued_by_pieces((low, high)), (low, high))
+        (low, high), (first, last) = model.support.known(highest), model.bearings.frequency_range
+        span = max(low, first), min(high, last)
+        if not span[0] < span[1]:
+            raise OutOfTableError(
+                f'tables of bearings must hold some frequency of vibration up to '
+                f'{rad_s_to_hz(high):.4g} Hz, got {rad_s_to_hz(first):g} to '
+                f'{rad_s_to_hz(last):g} Hz')
+        return cls(model, basis, model.support.continued_by_pieces(span), span, following)
+
+    @cached_property
+    def zones(self) -> tuple[Zone, ...]:
+        """Frequencies between which soil, bearings and shaft each follow one law, rising."""
+        losses = self.basis.losses
+        is_split = losses is not None and losses.is_hysteretic and not self.following
+        return zones_of(self.pieces, self.span, self.model.bearings.frequencies,
+                        lags=(-1.0, 1.0) if is_split else (0.0,))
 
     @classmethod
     def lowest(
@@ -194,10 +218,12 @@ class SpectrumSolver:
         stiffness, mass, polar = held(model.rotor, model.nominal_springs)
         journals = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
         # What the bearings must exert for the reduced equations to hold, in both of them.
-        exerted = (shape - w**2 * shape * basis.mass + turning * (shape @ basis.polar)) @ (
+        exerted = (shape - w**2 * shape * basis.mass + turning * (shape @ basis.polar)
+                   + self._lost(basis.losses, shape, w, speed[row])) @ (
             np.linalg.pinv(basis.shapes[journals]))
         full = shape @ basis.shapes.T
         lacking = full @ stiffness - w**2 * (full @ mass) + turning * (full @ polar)
+        lacking += self._lost(model.rotor.losses, full, w, speed[row])
         lacking[..., journals] -= exerted
         bent = scipy.linalg.solve(stiffness, lacking.reshape(-1, len(stiffness)).T,
                                   assume_a='pos').T.reshape(full.shape)
@@ -206,23 +232,41 @@ class SpectrumSolver:
         energy = (np.abs(shape) ** 2).sum(axis=(1, 2)) + kinetic.sum(axis=1)
         return float((error / energy).max(initial=0.0))
 
+    @staticmethod
+    def _lost(
+        losses: Losses | None, shape: ComplexArray, w: ComplexArray, speed: float,
+    ) -> ComplexArray:
+        """Return what a lossy shaft exerts on shapes (p, 2, m) of frequencies (p, 1, 1)."""
+        if losses is None:
+            return np.zeros_like(shape)
+        return np.stack([
+            shape[:, index] @ losses.held(direction, speed=float(speed), lag=1.0).T
+            + w[:, 0] * (shape[:, index] @ losses.rate(direction).T)
+            for index, direction in enumerate(WHIRL_DIRECTIONS)], axis=1)
+
     def deflection(self, rotor: ComplexArray) -> ComplexArray:
         """Return (x, z) of every node, (k, 2), in a shape of the rotor, (2, r)."""
-        return np.asarray(self.basis.shapes[::2] @ rotor.T @ ORBITS)
+        return self.bent(rotor)[0]
+
+    def bent(self, rotor: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return deflections as `deflection`, and slopes in the planes of x and z, (k, 2)."""
+        motion = self.basis.shapes @ rotor.T @ ORBITS
+        return motion[::2], motion[1::2]
 
     def _solve(self, speed: FloatArray, count: int, spare: int) -> Spectrum:
-        basis = self.basis
-        spin = basis.spin(np.maximum(speed, _CREEP * basis.mass.max() ** -0.5))
-        return _merged([self._solve_piece(speed, spin, piece, count + spare)
-                        for piece in self.pieces], count)
+        turning = np.maximum(speed, _CREEP * self.basis.mass.max() ** -0.5)
+        whirls = {lag: self.basis.whirls(turning, lag)
+                  for lag in {zone.lag for zone in self.zones}}
+        return _merged([self._solve_zone(speed, whirls[zone.lag], zone, count + spare)
+                        for zone in self.zones], count)
 
-    def _solve_piece(
-        self, speed: FloatArray, spin: tuple[FloatArray, FloatArray], piece: Continuation,
-        count: int,
+    def _solve_zone(
+        self, speed: FloatArray, whirls: Whirls,
+        zone: Zone, count: int,
     ) -> Spectrum:
-        """Return the vibrations whose frequency lies where a continuation holds."""
+        """Return the vibrations whose frequency lies in a zone."""
         for reach in _REACHES:
-            vibration = self._at(speed, spin, piece, reach)
+            vibration = self._at(speed, whirls, zone, reach)
             frequency, vector, sound, untold = vibration.solve(count)
             if sound.all():
                 break
@@ -230,20 +274,21 @@ class SpectrumSolver:
             raise NotSolvedError('modes could not be told apart at '
                                  f'{rad_s_to_rpm(float(speed[~sound][0])):g} rpm')
         low, high = vibration.within
-        known = (frequency.real >= low) & (frequency.real <= high)
+        known = (frequency.real >= low[:, None]) & (frequency.real <= high[:, None])
         untold = np.where((untold >= low) & (untold <= high), untold, np.inf)
-        return self._spectrum(vibration, spin[1], np.where(known, frequency, np.nan), vector,
+        return self._spectrum(vibration, whirls[1], np.where(known, frequency, np.nan), vector,
                               untold)
 
     def _spectrum(
-        self, vibration: FreeVibration, amplitude: FloatArray, frequency: ComplexArray,
+        self, vibration: FreeVibration, amplitude: AnyArray, frequency: ComplexArray,
         vector: ComplexArray, untold: FloatArray,
     ) -> Spectrum:
         """Turn what the equations are solved for into shapes that all speeds share."""
         basis, exists = self.basis, np.isfinite(frequency)
         states = vibration.amplitudes(np.where(exists, frequency, 0.0), vector)
-        turn, half = amplitude.transpose(0, 2, 1), amplitude.shape[2]
-        rotor = np.stack([states[..., :half] @ turn, states[..., half:] @ turn], axis=2)
+        turn, half = amplitude.transpose(0, 1, 3, 2), amplitude.shape[3]
+        rotor = np.stack([states[..., :half] @ turn[:, 0], states[..., half:] @ turn[:, 1]],
+                         axis=2)
         support = vector[..., vector.shape[2] - len(vibration.mass):]
         moving = np.sqrt(basis.mass) * rotor
         forward, backward = (np.abs(moving) ** 2).sum(axis=-1).transpose(2, 0, 1)
@@ -258,21 +303,22 @@ class SpectrumSolver:
             untold)
 
     def _at(
-        self, speed: FloatArray, spin: tuple[FloatArray, FloatArray], piece: Continuation,
-        reach: float,
+        self, speed: FloatArray, whirls: Whirls,
+        zone: Zone, reach: float,
     ) -> FreeVibration:
-        inverse, amplitude = spin
-        model, support, size = self.model, self.model.support, piece.size
+        inverse, right, left = whirls
+        model, support, size = self.model, self.model.support, zone.compliance.size
         rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
         unit = np.sqrt(model.nominal_springs)
-        journals = (unit[:, None] * self.basis.shapes[rows]) @ amplitude
+        journals = unit[:, None] * self.basis.shapes[rows]
         unit = np.repeat(unit, 2)
-        stiffness, damping = model.bearing_coefficients(speed)
+        constant, rate, inertia = (part / (unit[:, None] * unit)
+                                   for part in model.bearings.series(speed, zone.between))
         return FreeVibration(
-            inverse, journals, stiffness / (unit[:, None] * unit),
-            damping / (unit[:, None] * unit), unit[:, None] * support.motion_rows * size,
-            size[:, None] * support.motion_mass * size, piece, self.span[1], reach,
-            self.span if len(self.pieces) == 1 else piece.span)
+            inverse, journals @ right, journals @ left.swapaxes(2, 3), (constant, rate, inertia),
+            unit[:, None] * support.motion_rows * size,
+            size[:, None] * support.motion_mass * size, zone.compliance, self.span[1], reach,
+            zone.ends(zone.told, speed))
 
 
 def _merged(parts: list[Spectrum], count: int) -> Spectrum:

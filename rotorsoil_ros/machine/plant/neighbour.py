@@ -76,25 +76,32 @@ class Neighbour:
 
         """
         model, count = self._led, 2 * len(self.rotor.bearings)
-        modes = self._modes(float(np.abs(omega).max(initial=0.0)))
-        rotor = modes.receptance(omega)
-        bearings = model.bearing_stiffness(omega, np.full(len(omega), self.held_speed))
-        return driven(
-            rotor, np.zeros((1, count, count), dtype=complex), np.eye(count, dtype=complex)[None],
-            np.zeros((rotor.shapes.shape[1], count), dtype=complex),
-            bearings=bearings, springs=np.repeat(model.nominal_springs, 2))
+        highest = float(np.abs(omega).max(initial=0.0))
+        ports = np.empty((len(omega), 2 * len(model.ports), count), dtype=complex)
+        through = np.empty((len(omega), count, count), dtype=complex)
+        lags = model.lags(omega, self.speed)
+        for lag in np.unique(lags).tolist():
+            rows = np.flatnonzero(lags == lag)
+            bearings = model.bearings.dynamic_stiffness(
+                omega[rows], np.full(len(rows), self.held_speed))
+            ports[rows], through[rows] = driven(
+                self._modes(highest, lag).receptance(omega[rows]),
+                np.zeros((1, count, count), dtype=complex), np.eye(count, dtype=complex)[None],
+                np.zeros((ports.shape[1], count), dtype=complex),
+                bearings=bearings, springs=np.repeat(model.nominal_springs, 2))
+        return ports, through
 
-    def _modes(self, highest: float) -> WhirlModes:
+    def _modes(self, highest: float, lag: float) -> WhirlModes:
         """Return modes that serve up to a frequency; found once for all below a power of two."""
         reach = 2.0 ** math.ceil(math.log2(max(highest, 1.0)))
-        found = self._found.get(reach)
+        found = self._found.get((reach, lag))
         if found is None:
             model = self._led
-            found = self._found[reach] = WhirlModes.at(
+            found = self._found[reach, lag] = WhirlModes.at(
                 self.rotor, model.ports, springs=model.nominal_springs, speed=self.speed,
-                highest=reach)
+                highest=reach, lag=lag)
         return found
 
     @cached_property
-    def _found(self) -> dict[float, WhirlModes]:
+    def _found(self) -> dict[tuple[float, float], WhirlModes]:
         return {}

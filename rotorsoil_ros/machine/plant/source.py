@@ -143,7 +143,7 @@ class SourceModel(CoupledModel):
             np.broadcast_to(moved, (len(omega), *moved.shape[1:]))], axis=2))
         ports, through = driven(
             rotor, met[:, own, :count], met[:, own, count:], loads[:reach],
-            bearings=self.bearing_stiffness(omega, speed),
+            bearings=self.bearings.dynamic_stiffness(omega, speed),
             springs=np.repeat(self.nominal_springs, 2))
         housings = met[..., :count] @ through + met[..., count:]
         forces = pull @ housings

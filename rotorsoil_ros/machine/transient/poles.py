@@ -204,7 +204,7 @@ def _sampled(
     low, high = speed_range
     for first, last in ((_BEYOND[0] * low, _BEYOND[1] * high), (low, high)):
         try:
-            first, last = model.within_tables((first, last))
+            first, last = model.bearings.within_tables((first, last))
             even = np.linspace(first or last / _SAMPLES, last, _SAMPLES)
             speed = np.union1d(even, dense[(dense > 0.0) & (dense >= first) & (dense <= last)])
             speed = speed[(speed > high) | growth.holds(speed)]

@@ -6,7 +6,8 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.rotor.assembly import Rotor
-from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
+from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.rotor.coefficients import values
 from rotorsoil_ros.units import GRAVITY
 
 
@@ -68,6 +69,5 @@ def sinking(bearing: Bearing, *, on_film: bool) -> float:
         np.linalg.inv(bearing.pedestal.stiffness)[1, 1])
     if on_film:
         return below
-    own = bearing.stiffness
-    upright = float((own.values[0] if isinstance(own, SpeedTable) else own)[1, 1])
+    upright = float(values(bearing.stiffness).reshape(-1, 2, 2)[0, 1, 1])
     return below + 1.0 / upright if upright > 0.0 else math.inf

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
-from rotorsoil_ros.rotor.bearing import SpeedTable
+from rotorsoil_ros.rotor.coefficients import SpeedTable
 from rotorsoil_ros.rotor.journal.fixed import FixedPads
 from rotorsoil_ros.rotor.journal.geometry import JournalBearing
 from rotorsoil_ros.rotor.journal.oil import Viscosity

@@ -15,7 +15,8 @@ from rotorsoil_ros.machine.modes.feeding import highest_fed
 from rotorsoil_ros.machine.modes.pencil import Pencil
 from rotorsoil_ros.machine.modes.stability import Stability, stability
 from rotorsoil_ros.rotor.assembly import Rotor
-from rotorsoil_ros.rotor.bearing import Bearing, SpeedTable
+from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.rotor.coefficients import SpeedTable
 from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.shaft import Material, ShaftSection
 
