@@ -45,7 +45,7 @@ def study(arguments: Namespace) -> int:
         from rotorsoil_ros.figures.variants import study_figure
 
         study_figure(found).savefig(arguments.picture)
-    for line in dict.fromkeys(found.failures.values()):
+    for line in dict.fromkeys([*found.failures.values(), *found.unstable.values()]):
         print(line, file=sys.stderr)
     return 0
 

@@ -71,6 +71,9 @@ def test_an_unstable_variant_has_no_steady_response(tmp_path):
     found = study(machine, {'rotor.bearings.0.stiffness.xz': [-4e5, 4e5]}, rpm=[1000.0, 1500.0])
     assert found.is_steady.tolist() == [False, True]
     assert found.failures == {}
+    assert list(found.unstable) == [(0,)]
+    assert 'grows, fed by the cross-coupled stiffness of b1' in found.unstable[0,]
+    assert {row['failure'] for row in found.rows()} == {'', found.unstable[0,]}
 
 
 @pytest.mark.parametrize('values, why', [

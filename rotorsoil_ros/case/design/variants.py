@@ -1,7 +1,7 @@
 """What if the ground were softer, the block heavier? One machine with all values of some keys."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 import math
 from pathlib import Path
@@ -12,7 +12,7 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, Numbers, n
 from rotorsoil_ros.background import Mapper
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.machine import load, Machine
-from rotorsoil_ros.case.summary import unstable
+from rotorsoil_ros.case.summary import unstable as grown
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.prediction import columns_of
@@ -47,11 +47,12 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """Channels and displacements, (n, c) [m, rad], of a variant; why some or all are missing."""
+    """Channels, displacements, (n, c) [m, rad], of a variant; why none, or why not all."""
 
     channels: tuple[Channel, ...] = ()
     displacement: ComplexArray | None = None
     failure: str = ''
+    unstable: str = ''
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +70,8 @@ class Study:
         What moves.
     displacement : (..., n, c) complex array
         [m, rad], zero-to-peak; NaN where a variant has no steady response.
-    failures : dict of tuple to str
-        By index why a variant has no answer, or none at some of the speeds.
+    failures, unstable : dict of tuple to str
+        By index why a variant has no answer at all, and why not at every speed.
 
     """
 
@@ -79,6 +80,7 @@ class Study:
     channels: tuple[Channel, ...]
     displacement: ComplexArray
     failures: dict[tuple[int, ...], str]
+    unstable: dict[tuple[int, ...], str] = field(default_factory=dict)
 
     @property
     def is_steady(self) -> BoolArray:
@@ -123,7 +125,8 @@ class Study:
                            'phase_rad': float(phase[at]), **(
                                {} if channel.is_rotation
                                else {'velocity_mm_s_rms': float(velocity[at])}),
-                           'failure': '' if np.isfinite(size[at]) else self.failures[place]}
+                           'failure': '' if np.isfinite(size[at]) else (
+                               self.failures.get(place) or self.unstable.get(place, ''))}
 
 
 def study(
@@ -186,9 +189,9 @@ def try_variant(variant: Variant) -> Tried:
         machine = Machine(variant.case.changed(variant.settings), variant.directory)
         found = machine.response(rpm=variant.rpm).displacement
         # What has no steady response says why, beside those of its speeds that have one.
-        why = '' if np.isfinite(found).all() else '; '.join(unstable(machine.stability(
+        why = '' if np.isfinite(found).all() else '; '.join(grown(machine.stability(
             rpm_range=(float(variant.rpm.min()), float(variant.rpm.max())))))
-        return Tried(machine.model.channels, found, why)
+        return Tried(machine.model.channels, found, unstable=why)
     except RotorSoilError as error:
         return Tried(failure=str(error))
 
@@ -202,15 +205,16 @@ def _study(
     channels = answered[0].channels
     shape = tuple(len(each) for each in values.values())
     found = np.full((len(tried), len(rpm), len(channels)), complex(np.nan, np.nan))
-    failures = {}
+    failures: dict[tuple[int, ...], str] = {}
+    unstable: dict[tuple[int, ...], str] = {}
     for index, each in enumerate(tried):
         place = tuple(int(number) for number in np.unravel_index(index, shape))
-        if each.failure:
-            failures[place] = each.failure
         if each.displacement is None:
-            continue
-        if each.channels != channels:
+            failures[place] = each.failure
+        elif each.channels != channels:
             failures[place] = 'its channels are others than those of the first variant'
         else:
             found[index] = each.displacement
-    return Study(values, rpm, channels, found.reshape(*shape, len(rpm), len(channels)), failures)
+            unstable |= {place: each.unstable} if each.unstable else {}
+    return Study(values, rpm, channels, found.reshape(*shape, len(rpm), len(channels)), failures,
+                 unstable)
