@@ -1,5 +1,6 @@
 """How user units become SI: the only place in which a 60 appears."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
 from typing import TypeVar
@@ -58,6 +59,32 @@ def to_lag_deg(phase: FloatArray) -> FloatArray:
     return np.where(lag == 360.0, 0.0, lag)
 
 
+# Ends of the names of SI columns, longest first, what replaces them, and how.
+_PLANT_COLUMNS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
+    ('velocity_m_s_rms', 'velocity_mm_s_rms', lambda value: 1e3 * value),
+    ('speed_rad_s', 'speed_rpm', rad_s_to_rpm),
+    ('phase_rad', 'phase_lag_deg', lambda value: float(to_lag_deg(np.array(value)))),
+    ('_rad', '_urad_pp', lambda value: 2e6 * value),
+    ('_m', '_um_pp', lambda value: 2e6 * value))
+
+
+def plant_column(name: str) -> tuple[str, Callable[[float], float]]:
+    """Return how a column of a table in SI is called in units of a plant, and the conversion."""
+    for end, other, convert in _PLANT_COLUMNS:
+        if name.endswith(end):
+            return name.removesuffix(end) + other, convert
+    return name, lambda value: value
+
+
+def in_plant_units(row: Mapping[str, str | int | float]) -> dict[str, str | int | float]:
+    """Return a row of a table in SI, amplitudes zero-to-peak, in units of a plant."""
+    found: dict[str, str | int | float] = {}
+    for name, value in row.items():
+        other, convert = plant_column(name)
+        found[other] = convert(value) if isinstance(value, float) else value
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Units:
     """
@@ -78,11 +105,11 @@ class Units:
             return f'{rad_s_to_rpm(omega):.{digits}g} rpm'
         return f'{omega:.{digits}g} rad/s'
 
-    def displacement(self, amplitude: float, unit: str = 'm') -> str:
+    def displacement(self, amplitude: float, unit: str = 'm', *, digits: int = 4) -> str:
         """Return an amplitude, zero-to-peak [m], or [rad] if that is its unit, in words."""
         if self.are_of_plant:
-            return f'{2e6 * amplitude:.4g} u{unit} p-p'
-        return f'{amplitude:.4g} {unit} zero-to-peak'
+            return f'{2e6 * amplitude:.{digits}g} u{unit} p-p'
+        return f'{amplitude:.{digits}g} {unit} zero-to-peak'
 
     def velocity(self, rms: float) -> str:
         """Return a velocity [m/s rms] in words."""

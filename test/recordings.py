@@ -1,5 +1,8 @@
 """What a recording of rerun holds, and predictions to record."""
 
+from pathlib import Path
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -24,6 +27,14 @@ def column(path, entity, component, *, static=False):
                 if not static:
                     stamps += batch.column('time').cast('int64').to_pylist()
     return stamps, values
+
+
+def assert_whole(recording):
+    """Assert that other programs can read a recording and find their way in it."""
+    verified = subprocess.run(
+        [Path(sys.executable).with_name('rerun'), 'rrd', 'verify', recording],
+        capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stderr
 
 
 def predicted(machine, speeds, start=START, period=PERIOD):

@@ -118,6 +118,18 @@ def test_machine_that_behaves_passes(healthy):
         1253, 1389, 1467]  # test_modes and `check`
 
 
+def test_what_is_printed_is_peak_to_peak_and_lag(healthy):
+    out, said, _ = healthy
+    header, *rows = (re.split(' {2,}', line) for line in said.split('\n\n')[0].splitlines())
+    found = summary(out)['channels']
+    for row in rows:
+        told = dict(zip(header, row, strict=True))
+        own = found[told['channel']]
+        assert float(told['bias [um p-p]']) == pytest.approx(2e6 * own['bias'], rel=5e-3)
+        assert float(told['phase bias [deg of lag]']) == pytest.approx(
+            -np.degrees(own['phase_bias_rad']), rel=5e-3)
+
+
 def test_every_file_is_written_and_says_the_same(healthy):
     out, _, _ = healthy
     names = {path.name for path in out.iterdir()}
@@ -180,7 +192,8 @@ def test_softer_ground_fails_by_its_peaks(tmp_path):
 def test_unbalance_far_beyond_the_band_fails(tmp_path):
     said = '\n'.join(judged(write_vectors(tmp_path / 'log.mcap', gain=4.0)).failures)
     assert re.search(r'fan_end_housing_z: \d+ % of the amplitudes lie inside the band', said)
-    assert re.search(r'fan_end_housing_x: the peak measured at 1[23]\d\d rpm is .* um high', said)
+    assert re.search(
+        r'fan_end_housing_x: the peak measured at 1[23]\d\d rpm is .* um p-p high', said)
 
 
 def test_zone_d_is_told_and_fails_at_constant_speed_only(tmp_path):

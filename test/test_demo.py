@@ -44,7 +44,7 @@ def test_demo_leaves_log_recording_and_pictures(tmp_path, monkeypatch, capfd):
     assert {path.name for path in (tmp_path / 'run').iterdir()} == {
         '.rotorsoil_log', 'metadata.yaml', 'run_0.mcap', 'run.rrd'}
     assert (tmp_path / 'plots' / 'demo.png').stat().st_size > 10_000
-    assert 'um at' in said
+    assert 'um p-p at' in said
 
 
 def test_comparison_without_a_plant_finds_what_was_put_in(tmp_path, monkeypatch, capsys):

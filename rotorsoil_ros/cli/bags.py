@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 from rotorsoil_ros.case import config, document, ross
 from rotorsoil_ros.case.zone_limits import support_class, zone, ZoneLimits
 from rotorsoil_ros.cli.archive import is_archive, predict_archive
-from rotorsoil_ros.cli.arguments.options import SI
+from rotorsoil_ros.cli.arguments.options import PLANT, SI
 from rotorsoil_ros.cli.outputs import replacing
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.table import opened
@@ -182,6 +182,6 @@ def export(arguments: Namespace) -> int:
     output: Path = arguments.output
     with progress('exporting') as report:
         rows = export_log(arguments.log, output, machine=arguments.machine or '',
-                          progress=report)
+                          plant=arguments.units == PLANT, progress=report)
     print(f'{output}: {rows} rows')
     return 0

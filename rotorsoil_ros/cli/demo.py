@@ -28,7 +28,7 @@ from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.figures.response import all_figures, trend
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
-from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s
+from rotorsoil_ros.units import rad_s_to_rpm, rpm_to_rad_s, Units
 from rotorsoil_ros.wire.sensors import JointStateReader
 
 MACHINE = 'paper_rotor'
@@ -165,13 +165,13 @@ def _draw(
 def _summarise(case: Case, answers: _Answers, out: Path, log: Path) -> None:
     sent = len(speed_profile(0)[0])
     print(f'{sent} speeds sent over DDS, {len(answers.stamp_ns)} answered and logged')
-    print('largest amplitudes, zero-to-peak:')
+    print('largest displacements:')
     names = [name for bearing in case.rotor.bearings for name in across(bearing.name, HOUSING)]
     names += [name for disc in case.rotor.discs for name in across(disc.name)]
     for name in names:
         column = answers.amplitude[:, answers.channels.index(name)]
         at = int(np.nanargmax(column))
-        print(f'  {name:22s} {1e6 * column[at]:10.4g} um at '
+        print(f'  {name:22s} {Units().displacement(column[at]):>14s} at '
               f'{rad_s_to_rpm(float(answers.speed[at])):6.0f} rpm')
     print(f'log       {log}')
     for recording in sorted(log.glob('*.rrd')):

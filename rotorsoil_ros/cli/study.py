@@ -8,10 +8,12 @@ import sys
 from typing import TextIO, TYPE_CHECKING
 
 from rotorsoil_ros.case.design.variants import Study, study as solve, Tried, Variant
+from rotorsoil_ros.cli.arguments.options import PLANT
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of, values
-from rotorsoil_ros.cli.table import opened
+from rotorsoil_ros.cli.table import opened, units_of
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.units import in_plant_units
 
 if TYPE_CHECKING:
     from rotorsoil_ros.background import Mapper
@@ -40,7 +42,7 @@ def study(arguments: Namespace) -> int:
 
         found = solve(machine_of(arguments), varied, rpm=values(arguments.rpm), map=counted)
     with opened(arguments.output) as stream:
-        _write(found, stream)
+        _write(found, stream, plant=units_of(arguments) == PLANT)
     if arguments.picture is not None:
         from rotorsoil_ros.figures.variants import study_figure
 
@@ -63,8 +65,10 @@ def _mapped(jobs: int) -> 'Iterator[Mapper[Variant, Tried]]':
         yield partial(pool.map, chunksize=8)
 
 
-def _write(found: Study, stream: TextIO) -> None:
-    names = dict.fromkeys(name for row in found.rows() for name in row)
+def _write(found: Study, stream: TextIO, *, plant: bool) -> None:
+    rows = [in_plant_units(row) if plant else row
+            for row in found.rows()]
+    names = dict.fromkeys(name for row in rows for name in row)
     writer = csv.DictWriter(stream, names, restval='', lineterminator='\n')
     writer.writeheader()
-    writer.writerows(found.rows())
+    writer.writerows(rows)

@@ -29,7 +29,7 @@ _WAYS = {1: ('^', COLOURS[1], 'run-up'), -1: ('v', COLOURS[3], 'run-down'),
 # Share of its colour that a prediction has beside its measurement.
 _TINT = 0.55
 
-_MICRO = 1e6
+_MICRO = 2e6  # um, or urad, peak-to-peak
 _MILLI = 1e3
 _MOST_LINES = 6
 _LONGEST_LABEL = 48
@@ -78,7 +78,7 @@ def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
     if len(positive):
         amplitude.set_ylim(bottom=0.3 * float(np.percentile(positive, 1.0)))
     amplitude.set_yscale('log')
-    amplitude.set_ylabel(f'amplitude, zero-to-peak [{_unit(points.channel)}]')
+    amplitude.set_ylabel(f'amplitude, peak-to-peak [{_unit(points.channel)}]')
     phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
               yticks=range(-180, 181, 90))
     if len(speed) and np.isfinite(speed).any():
@@ -189,7 +189,7 @@ def polar(points: ChannelPoints, comparison: Comparison) -> Figure:
     axes.tick_params(labelsize=7)
     axes.legend(fontsize=7, loc='upper left', bbox_to_anchor=(1.02, 1.0))
     axes.set_title(f'{comparison.run.title}: {_label(points)}, 1X [{_unit(points.channel)}, '
-                   'zero-to-peak]', fontsize=9)
+                   'peak-to-peak]', fontsize=9)
     return figure
 
 
@@ -217,7 +217,7 @@ def trend(comparison: Comparison) -> Figure:
         _draw_zones(bottom, comparison)
     bottom.set_yscale('log')
     bottom.set(xlabel='time [s]', ylabel='housing velocity, 1X, rms [mm/s]' if housings
-               else f'amplitude, zero-to-peak [{_unit(shown[0].channel)}]')
+               else f'amplitude, peak-to-peak [{_unit(shown[0].channel)}]')
     bottom.legend(fontsize=7, ncols=3, loc='upper center', bbox_to_anchor=(0.5, -0.14))
     for axes in (top, bottom):
         axes.grid(alpha=0.3)
@@ -261,8 +261,8 @@ def residuals(comparison: Comparison) -> Figure:
                   label=_label(points))
         plane.plot(vector[used].real, vector[used].imag, '.', color=colour, markersize=4)
     size.set_yscale('log')
-    size.set(xlabel='speed [rpm]', ylabel='|measured - predicted| [um]')
-    plane.set(xlabel='real part [um]', ylabel='imaginary part [um]')
+    size.set(xlabel='speed [rpm]', ylabel='|measured - predicted|, peak-to-peak [um]')
+    plane.set(xlabel='real part, peak-to-peak [um]', ylabel='imaginary part, peak-to-peak [um]')
     plane.axhline(0.0, color='black', linewidth=0.5)
     plane.axvline(0.0, color='black', linewidth=0.5)
     plane.set_aspect('equal', adjustable='datalim')

@@ -27,10 +27,10 @@ _LONGEST_NAME = 100
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """In which units tables are, and by what SI is multiplied for them; amplitudes 0-peak."""
+    """In which units tables are, and by what SI is multiplied for them."""
 
     length: float = 1.0
-    length_unit: str = 'm'
+    length_unit: str = 'm 0-p'
     angle: float = 1.0
     angle_unit: str = 'rad'
     speed: float = 1.0
@@ -40,7 +40,8 @@ class Scale:
 
 
 SI_SCALE = Scale()
-PLANT_SCALE = Scale(1e6, 'um', math.degrees(1.0), 'deg', rad_s_to_rpm(1.0), 'rpm', 1e3, 'mm/s')
+PLANT_SCALE = Scale(2e6, 'um p-p', -math.degrees(1.0), 'deg of lag', rad_s_to_rpm(1.0), 'rpm', 1e3,
+                    'mm/s')
 
 # Pictures that are printed: with the tables they fill three sheets.
 _MOST_PRINTED = 6
@@ -59,7 +60,9 @@ _TERMS = {
     '1X': 'vibration once per turn; unbalance makes nothing else',
     'band': 'between which amplitudes the machine lies, as far as its soil, bearings and models '
             'are known',
-    'bias, scatter': 'mean and standard deviation of measured less predicted amplitude',
+    'bias, scatter': 'mean and standard deviation of measured less predicted amplitude, and of '
+                     'the phase, of which more lag is positive',
+    'p-p': 'peak to peak, twice the amplitude',
     'ratio': 'measured over predicted amplitude',
     'R^2': 'share of the measured vectors that the prediction explains, 1 at best',
     'quasi-static': 'the speed changes so slowly that the machine answers as at constant speed',
@@ -191,11 +194,12 @@ def channel_table(
     """Return header and rows of what was found, channel by channel."""
     length, angle = f'[{scale.length_unit}]', f'[{scale.angle_unit}]'
     header = ['channel', 'points', 'used', f'bias {length}', f'scatter {length}', 'ratio',
-              f'phase bias {angle}', f'phase scatter {angle}', 'R^2', 'inside band [%]']
+              f'phase bias {angle}', f'phase scatter {angle.replace(" of lag", "")}', 'R^2',
+              'inside band [%]']
     rows = [[points.channel, str(len(points.stamp_ns)), str(int(points.used.sum())),
              _number(scale.length * figures.bias), _number(scale.length * figures.scatter),
              _number(figures.ratio), _number(scale.angle * figures.phase_bias),
-             _number(scale.angle * figures.phase_scatter),
+             _number(abs(scale.angle) * figures.phase_scatter),
              _number(figures.r_squared), _number(100.0 * figures.inside)]
             for points, figures in zip(comparison.points, comparison.statistics, strict=True)]
     return header, rows
@@ -227,7 +231,7 @@ def zone_table(
 ) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the zones of the housings."""
     header = ['channel', 'source', 'zone', f'velocity [{scale.velocity_unit} rms]',
-              f'speed [{scale.speed_unit}]', 'support', f'limits [{scale.velocity_unit}]',
+              f'speed [{scale.speed_unit}]', 'support', f'limits [{scale.velocity_unit} rms]',
               'constant speed']
     rows = [[entry.channel, entry.source, entry.zone, _number(scale.velocity * entry.velocity),
              f'{scale.speed * entry.speed:.4g}', entry.support,

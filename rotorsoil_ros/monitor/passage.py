@@ -14,7 +14,7 @@ from rotorsoil_ros.monitor.quasistatic import (
     Resonance,
     SLOW_ENOUGH,
 )
-from rotorsoil_ros.units import rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_rpm, Units
 
 # A peak rises by this factor over the valleys beside it ...
 PROMINENCE = 1.5
@@ -305,6 +305,6 @@ def peak_fault(peak: PeakPair, *, margin: float) -> str:
         return (f'{at} is {100 * peak.deviation:+.1f} % from the predicted '
                 f'{rad_s_to_rpm(peak.predicted.speed):.0f} rpm, allowed {100 * margin:.0f} %')
     if peak.measured.amplitude > peak.allowed.most:
-        return (f'{at} is {1e6 * peak.measured.amplitude:.3g} um high, at most '
-                f'{1e6 * peak.allowed.most:.3g} um predicted')
+        return (f'{at} is {Units().displacement(peak.measured.amplitude, digits=3)} high, at '
+                f'most {Units().displacement(peak.allowed.most, digits=3)} predicted')
     return ''

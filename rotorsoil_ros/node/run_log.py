@@ -16,6 +16,7 @@ from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Diagnostics, Event
 from rotorsoil_ros.screen import open_viewer
+from rotorsoil_ros.screen.footer import Endings
 from rotorsoil_ros.wire.messages import Records
 
 if TYPE_CHECKING:
@@ -127,6 +128,7 @@ class RunLog:
             recovery.close()
         if viewer is not None:
             viewer.close()
+            self._display.end()
 
     def _follow(self, file: Path | None) -> None:
         """Begin a recording of the viewer beside each new file of the bag."""
@@ -160,6 +162,9 @@ class Display:
         self._settings, self._machines, self._complain = settings, machines, complain
         self._directory, self._bag = directory, bag
         self._sink: RerunSink | None = None
+        self._file: Path | None = None
+        self._is_whole = False
+        self._endings = Endings(complain)
 
     def begin(self) -> None:
         """Open a recording, a viewer or both."""
@@ -169,26 +174,41 @@ class Display:
             url = ''
         path = self._bag or self._make_alone(self._complain)
         if url or self._settings.rerun:
-            recording = path / f'{path.name}.rrd' if path and self._settings.rerun else None
-            self._sink = open_viewer(recording, self._machines, url=url)
+            self._file = path / f'{path.name}.rrd' if path and self._settings.rerun else None
+            self._sink = open_viewer(self._file, self._machines, url=url)
 
     def take(self, batch: list[Event | Path]) -> None:
         """Show events; at a path go on in a new recording, which is bounded as its bag is."""
         if self._sink is None:
             return
         if self.alone is None and (path := self._make_alone(lambda text: None)):
-            self._sink.begin(path / f'{path.name}.rrd')
+            self._go_on(path / f'{path.name}.rrd')
         for item in batch:
             if isinstance(item, Path):
-                self._sink.begin(item)
+                self._go_on(item)
             else:
                 self._sink(item)
         self._sink.flush()
+        self._endings.step()
 
     def close(self) -> None:
         """Finish the recording."""
         if self._sink is not None:
             self._sink.close()
+            self._is_whole = self._file is not None
+
+    def end(self) -> None:
+        """Give what was recorded its footer, once nobody writes it any more."""
+        if self._is_whole and self._file is not None:
+            self._endings.end(self._file)
+        self._endings.close()
+
+    def _go_on(self, file: Path) -> None:
+        assert self._sink is not None
+        self._sink.begin(file)
+        if self._file is not None:
+            self._endings.end(self._file)
+        self._file = file
 
     def _make_alone(self, complain: Tell) -> Path | None:
         """Make a directory for a recording without a bag."""

@@ -24,8 +24,8 @@ def open_viewer(
     """
     Open a recording, or a connection to a viewer, or both.
 
-    One that `ends`, as that of a recorded run does, has a footer, by which programs find their
-    way in it; a node's has none, so that its memory does not grow.
+    One that `ends`, as that of a recorded run does, gets its footer when it is closed; of those of
+    a node `footer.Endings` takes care.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def open_viewer(
     """
     if find_spec('rerun') is None:
         raise InputError('rerun-sdk is not installed: nothing is recorded for its viewer')
-    # It warns of a missing footer.
+    # It warns of a missing footer, which comes when the recording is ended.
     os.environ.setdefault('RUST_LOG', 'error')
     from rotorsoil_ros.screen.viewer import RerunSink
     return RerunSink(recording, machines, url=url, ends=ends)

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterable, Mapping
+import logging
 from pathlib import Path
 from types import TracebackType
 
@@ -29,6 +30,7 @@ from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.screen.blueprint import blueprint, Shown
 from rotorsoil_ros.screen.bode import Bode
 from rotorsoil_ros.screen.channels import trends
+from rotorsoil_ros.screen.footer import Endings
 from rotorsoil_ros.screen.orbits import Orbits
 from rotorsoil_ros.screen.picture import FRAME_NS, Picture
 from rotorsoil_ros.screen.recording import Recording
@@ -66,8 +68,9 @@ class RerunSink:
         # The stream stays: rerun never frees one, nor its two threads.
         for view in self._views.values():
             view.flush()
-        # A footer keeps two kilobytes in memory for every chunk until the end: for ever in a node.
-        file = [rr.FileSink(path, write_footer=self._ends)] if path else []
+        # `footer` tells why there is none yet.
+        file = [rr.FileSink(path, write_footer=False)] if path else []
+        self._path = path
         viewer = [rr.GrpcSink(self._url)] if self._url else []
         if not file and not viewer:  # the disk takes none yet: rerun would keep all in memory
             self._views = {}
@@ -123,6 +126,10 @@ class RerunSink:
         for view in self._views.values():
             view.flush()
         self._stream.disconnect()
+        if self._ends and self._path is not None:
+            endings = Endings(logging.getLogger(__name__).warning)
+            endings.end(self._path)
+            endings.close()
 
 
 def packed(stream: rr.RecordingStream, layout: rr.blueprint.Blueprint) -> bytes:

@@ -11,7 +11,7 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 from rotorsoil_ros.testing.graph import DEADLINE_S
 
-from recordings import column, predicted
+from recordings import assert_whole, column, predicted
 from records import joint_records, START
 
 SECOND = 10**9
@@ -46,6 +46,7 @@ def test_a_recording_begins_with_each_file_of_the_bag(tmp_path, machine):
         MARKER, 'metadata.yaml', 'run.rrd', 'run_0.mcap', 'run_1.mcap', 'run_1.rrd', 'run_2.mcap',
         'run_2.rrd', 'run_3.mcap']
     for number, name in enumerate(('run', 'run_1', 'run_2')):
+        assert_whole(tmp_path / 'run' / f'{name}.rrd')
         stamps, _ = column(tmp_path / 'run' / f'{name}.rrd', '/fan/speed', 'Scalars:scalars')
         assert len(stamps) == 10
         assert stamps[0] // SECOND == (START + 2 * number * SECOND) // SECOND

@@ -16,6 +16,7 @@ from rotorsoil_ros.bags.tables.files import opened, require_suffix, Value
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.units import in_plant_units, plant_column
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, STRING
 from rotorsoil_ros.wire.handlers import SPEED_TOPICS
@@ -45,7 +46,8 @@ ROWS_AT_ONCE = 50_000
 
 
 def export_log(
-    log: Path | str, out: Path | str, *, machine: str = '', progress: Progress | None = None,
+    log: Path | str, out: Path | str, *, machine: str = '', plant: bool = False,
+    progress: Progress | None = None,
 ) -> int:
     """
     Write what a log tells as a long table.
@@ -58,6 +60,8 @@ def export_log(
         Table to write: `.csv`, or `.parquet` if pyarrow is installed.
     machine : str
         Which machine; empty: all.
+    plant : bool
+        Whether in um peak-to-peak, mm/s rms, rpm and degrees of lag, instead of SI.
     progress : callable
         Called with the number of messages read and their total.
 
@@ -84,7 +88,11 @@ def export_log(
                          'or measured')
     total = sum(number for source, number in sources.items() if source.topic in wanted)
     count = done = 0
-    with opened(out, COLUMNS) as write:
+    columns = {plant_column(name)[0]: kind for name, kind in COLUMNS.items()}
+    with opened(out, columns if plant else COLUMNS) as write_rows:
+        def write(rows: Sequence[Mapping[str, Value]]) -> None:
+            write_rows([in_plant_units(row) for row in rows] if plant else rows)
+
         rows: list[Mapping[str, Value]] = []
         tables = _Tables(wanted)
         for batch in bag_reader.batches(

@@ -15,6 +15,7 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.soil import equivalent_radii
 from rotorsoil_ros.machine.band import depends_on_soil
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.units import Units
 
 # Depth of rock that is tried where nothing is said of it, in radii below the base, and at how
 # many speeds.
@@ -57,8 +58,10 @@ def depth_remarks(case: Case, model: CoupledModel, directory: Path) -> Iterator[
                 case, model, spread, {'rock_depth': -1.0}, Cache(directory))))
     except RotorSoilError:  # beyond the reach of a model: its own error says so
         return
-    first, second = (1e6 * float(found.max(initial=0.0)) for found in (without, on_rock))
+    first, second = (float(found.max(initial=0.0)) for found in (without, on_rock))
     if second > _MATTERS * first:
         yield (f'soil: nothing is said of rock; at {depth:g} m below the surface it would raise '
-               f'the highest amplitude of the housings from {first:.3g} to {second:.3g} um '
-               'zero-to-peak: say uncertainty.rock_depth, or soil.layers and below')
+               f'the highest displacement of the housings from '
+               f'{Units().displacement(first, digits=3)} to '
+               f'{Units().displacement(second, digits=3)}: say uncertainty.rock_depth, or '
+               'soil.layers and below')

@@ -118,7 +118,7 @@ def _add_study(verbs: Verbs) -> None:
         help='key of the case, as in soil.shear_modulus, and what is tried: A to B in N steps, '
              'or V,V,V; may be repeated')
     add('--rpm', metavar='A:B:N', type=sweep_or_one, required=True, help='rotor speed [rpm]')
-    add_output(study, 'FILE', 'CSV file to write', default='-')
+    add_table_output(study)
     add('--picture', metavar='X.png', type=Path,
         help='highest velocity of a housing over the one or two keys')
     add('--jobs', metavar='N', type=number_of('processes'), default=1,
@@ -184,6 +184,7 @@ def _add_import_verbs(verbs: Verbs) -> None:
                    case=False)
     export.add_argument('log', metavar='LOG', type=Path, help='MCAP file or bag')
     add_output(export, 'X.parquet or X.csv', 'table to write')
+    add_units(export)
     export.add_argument('--machine', metavar='NAME', help='which machine (default: all)')
     ross = add_verb(verbs, 'import-ross', 'bags:import_ross',
                  'write the case of a rotor that ROSS saved as TOML or JSON', case=False)

@@ -115,6 +115,14 @@ def test_the_verb_writes_what_was_measured_without_any_case(log, tmp_path, capsy
     np.testing.assert_allclose(column(found, 'speed_rad_s'),
                                rpm_to_rad_s(np.linspace(700.0, 1500.0, 20)), rtol=1e-12)
     assert np.isfinite(column(found, 'measured_phase_rad')).all()
+    plant = tmp_path / 'plant.csv'
+    assert main(['export', str(log.with_name('run.mcap')), '-o', str(plant), '--units',
+                 'plant']) == 0
+    with plant.open(newline='') as stream:
+        told = list(csv.DictReader(stream))
+    np.testing.assert_allclose(column(told, 'measured_um_pp'),
+                               2e6 * column(found, 'measured_m'), rtol=1e-12)
+    np.testing.assert_allclose(column(told, 'speed_rpm'), np.linspace(700.0, 1500.0, 20))
     assert main(['export', str(log), '-o', str(out)]) == 2
     assert 'exists; --force replaces it' in capsys.readouterr().err
 
