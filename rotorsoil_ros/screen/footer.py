@@ -11,8 +11,8 @@ from rotorsoil_ros.background import Child, Children, run_as_child
 from rotorsoil_ros.errors import InputError
 
 # To end a recording takes about three times its size of memory.
-LARGEST_BYTES = 512 * 1024 * 1024
-PATIENCE_S = 30.0  # for each of the last ones, when the node stops
+LARGEST_RECORDING = 512 * 1024 * 1024
+ENDING_S = 30.0  # for each of the last ones, when the node stops
 
 
 class Endings:
@@ -46,7 +46,7 @@ class Endings:
         ended = -1
         while not self._children.are_done and ended < self._ended:
             ended = self._ended
-            self._children.step(wait_s=PATIENCE_S)
+            self._children.step(wait_s=ENDING_S)
         self._children.close()
         for recording, failure in self._failed.items():
             self._complain(f'{recording}: has no footer: {failure}')
@@ -70,8 +70,8 @@ def end(recording: Path) -> None:
     """
     from rerun_cli.__main__ import main  # type: ignore[import-untyped]
 
-    if recording.stat().st_size > LARGEST_BYTES:
-        raise InputError(f'{recording}: is larger than {LARGEST_BYTES >> 20} MiB')
+    if recording.stat().st_size > LARGEST_RECORDING:
+        raise InputError(f'{recording}: is larger than {LARGEST_RECORDING >> 20} MiB')
     aside = recording.with_name(f'.{recording.name}.ending')
     sys.argv = ['rerun', 'rrd', 'optimize', str(recording), '-o', str(aside)]
     try:

@@ -12,7 +12,8 @@ from rotorsoil_ros.events import NANOSECONDS, Samples
 from rotorsoil_ros.screen.chart import Axis, drawn_grid, grid, Label, written
 from rotorsoil_ros.screen.recording import Recording
 
-COLUMNS, ROWS = 160, 80
+COLUMNS, PARTS, PART_ROWS = 160, 10, 8
+ROWS = PARTS * PART_ROWS
 PERIOD_NS = 2 * NANOSECONDS
 ORDERS = 6  # of the fastest speed, that are shown
 QUIETEST, LOUDEST = 0.001, 10.0  # [mm/s rms], darkest and brightest
@@ -28,7 +29,8 @@ class Waterfall:
     The spectrum of one raw channel every two seconds, the newest on top.
 
     Every column shows the largest line of the spectrum that falls into it: a peak that is
-    narrower than a column is not lost.
+    narrower than a column is not lost. The picture is made of parts, of which the oldest begins
+    anew: each period sends what has come, and by how much the rest has moved.
     """
 
     def __init__(self, recording: Recording, entity: str, topic: str, *, top_hz: float) -> None:
@@ -37,8 +39,9 @@ class Waterfall:
         self._frequency = Axis(0.0, top_hz, 0.0, COLUMNS)
         self._stamps: list[IntArray] = []
         self._samples: list[FloatArray] = []
-        self._rows: deque[np.ndarray] = deque(maxlen=ROWS)
-        self._turning: deque[float] = deque(maxlen=ROWS)
+        self._count = 0  # periods so far
+        self._rows: deque[np.ndarray] = deque(maxlen=PART_ROWS)
+        self._turning: deque[float] = deque(maxlen=PART_ROWS + 1)
         recording.still(f'{entity}/labels', written(
             [Label(f'no raw acceleration has come on {topic}', 0.5 * COLUMNS, 0.5 * ROWS)]))
 
@@ -76,15 +79,21 @@ class Waterfall:
         return steps.place(loudest).astype(np.uint8)
 
     def _draw(self, stamp_ns: int) -> None:
-        picture = np.zeros((ROWS, COLUMNS), dtype=np.uint8)
-        picture[:len(self._rows)] = self._rows
-        stamps = np.array([stamp_ns])
-        self._recording.send(f'{self._entity}/picture', stamps, rr.DepthImage.columns(
-            buffer=[picture.tobytes()]))
-        turning = np.array(self._turning)
+        """Send the part that grows, newest row on top, and move everything down by a row."""
+        part = f'{self._entity}/picture/{self._count // PART_ROWS % PARTS}'
+        grown = self._count % PART_ROWS + 1
+        stamps, rows = np.array([stamp_ns]), list(self._rows)[:grown]
+        self._recording.send(part, stamps, [
+            *rr.DepthImage.columns(buffer=[np.concatenate(rows).tobytes()], format=[
+                rr.components.ImageFormat(width=COLUMNS, height=grown, channel_datatype='U8')]),
+            *rr.Transform3D.columns(translation=[[0.0, -float(self._count), 0.0]])])
+        turning = np.array(list(self._turning)[:grown + 1])  # from the end of the part before
         points = np.column_stack([self._frequency.place(turning),
                                   np.arange(len(turning)) + 0.5])[np.isfinite(turning)]
-        self._recording.strips(f'{self._entity}/speed', stamps, [[points] * (len(points) > 1)])
+        self._recording.strips(f'{part}/speed', stamps, [[points] * (len(points) > 1)])
+        self._recording.send(f'{self._entity}/picture', stamps, rr.Transform3D.columns(
+            translation=[[0.0, float(self._count), 0.0]]))
+        self._count += 1
 
     def _draw_frame(self) -> None:
         ticks = self._frequency.ticks(8)
@@ -102,13 +111,12 @@ class Waterfall:
         still(f'{self._entity}/labels', written(labels))
         still(f'{self._entity}/grid', drawn_grid(
             grid(self._frequency, rows, x_ticks=ticks, y_ticks=ago)))
-        # Not its pixels: what is static would hide those that come.
-        still(f'{self._entity}/picture', rr.DepthImage.from_fields(
-            format=rr.components.ImageFormat(
-                width=COLUMNS, height=ROWS, channel_datatype='U8'),
-            colormap='inferno', depth_range=(0.0, 255.0), draw_order=-20.0))
-        still(f'{self._entity}/speed', rr.LineStrips2D.from_fields(
-            colors=SPEED, radii=rr.Radius.ui_points(0.5)))
+        for part in range(PARTS):
+            # Not its pixels: what is static would hide those that come.
+            still(f'{self._entity}/picture/{part}', rr.DepthImage.from_fields(
+                colormap='inferno', depth_range=(0.0, 255.0), draw_order=-20.0))
+            still(f'{self._entity}/picture/{part}/speed', rr.LineStrips2D.from_fields(
+                colors=SPEED, radii=rr.Radius.ui_points(0.5)))
 
 
 def spectrum(stamp_ns: IntArray, acceleration: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -17,7 +17,16 @@ from rotorsoil_ros.screen.channels import trends  # noqa: E402
 from rotorsoil_ros.screen.orbits import Orbits  # noqa: E402
 from rotorsoil_ros.screen.scene import Scene  # noqa: E402
 from rotorsoil_ros.screen.viewer import MachineView  # noqa: E402
-from rotorsoil_ros.screen.waterfall import COLUMNS, LOUDEST, QUIETEST, spectrum, Waterfall  # noqa: E402
+from rotorsoil_ros.screen.waterfall import (  # noqa: E402
+    COLUMNS,
+    LOUDEST,
+    PART_ROWS,
+    PARTS,
+    QUIETEST,
+    ROWS,
+    spectrum,
+    Waterfall,
+)
 
 START = 1_790_000_000_000_000_000
 SECOND = 10**9
@@ -246,22 +255,42 @@ def test_the_spectrum_of_a_tone_has_its_velocity(gap):
     assert velocity[peak] == pytest.approx(1.5, rel=0.03)  # a hole of 1 % of the samples
 
 
+def seen(paper):
+    """Return what a waterfall shows: rows of its picture and points of its line, from the top."""
+    [[[_, moved, _]]] = paper.drawn['water/picture', 'Transform3D:translation']
+    rows, points = {}, set()
+    for part in range(PARTS):
+        own = f'water/picture/{part}'
+        if (own, 'DepthImage:buffer') not in paper.drawn:
+            continue
+        [[[_, place, _]]] = paper.drawn[own, 'Transform3D:translation']
+        [picture] = paper.drawn[own, 'DepthImage:buffer']
+        for row, shades in enumerate(np.array(picture, dtype=np.uint8).reshape(-1, COLUMNS)):
+            rows[moved + place + row] = shades
+        points |= {(float(x), moved + place + float(y))
+                   for line in paper.drawn[f'{own}/speed', 'strips'][0] for x, y in line}
+    return rows, points
+
+
 def test_a_waterfall_shows_the_newest_spectrum_on_top(paper):
     waterfall = Waterfall(paper, 'water', 'fan/measured/a/imu', top_hz=200.0)
     [words] = paper.drawn['water/labels', 'Points2D:labels']
     assert words == 'no raw acceleration has come on fan/measured/a/imu'
-    for number, hertz in enumerate((25.0, 100.0)):
+    tones = [20.0 + 2.0 * number for number in range(ROWS + 5)]
+    for number, hertz in enumerate(tones):
         stamps, acceleration = tone(hertz, LOUDEST)
         waterfall.take(Samples('fan', 'a', stamps + 3 * SECOND * number, acceleration),
                        2.0 * np.pi * hertz)
-    [picture] = paper.drawn['water/picture', 'DepthImage:buffer']
-    rows = np.array(picture, dtype=np.uint8).reshape(-1, COLUMNS)
-    assert rows[0].argmax() == pytest.approx(100.0 / 200.0 * COLUMNS, abs=1)
-    assert rows[1].argmax() == pytest.approx(25.0 / 200.0 * COLUMNS, abs=1)
-    assert rows[0].max() >= 253  # LOUDEST is 255
-    assert not rows[2:].any()
-    [[speed]] = paper.drawn['water/speed', 'strips']
-    np.testing.assert_allclose(speed, [(80.0, 0.5), (20.0, 1.5)])
+        [picture] = paper.drawn[f'water/picture/{number // PART_ROWS % PARTS}',
+                                'DepthImage:buffer']
+        assert len(picture) <= PART_ROWS * COLUMNS  # what is new, and little else
+    rows, points = seen(paper)
+    assert sorted(rows) == list(range(ROWS - 3))  # the oldest part has begun anew
+    for row, shades in rows.items():
+        place = tones[-1 - int(row)] / 200.0 * COLUMNS
+        assert shades.argmax() == pytest.approx(place, abs=1)
+        assert shades.max() >= 253  # LOUDEST is 255
+        assert any(abs(x - place) < 1e-3 and y == row + 0.5 for x, y in points)
     assert 'no raw' not in ' '.join(paper.drawn['water/labels', 'Points2D:labels'])
     assert 0.0 < QUIETEST < LOUDEST
 
