@@ -6,7 +6,8 @@ prints CPU seconds of one core, pieces, exact solves, nodes, milliseconds per so
 each step, the error that the table states, that at unseen frequencies against a finer mesh, and
 the largest memory of the process. `--rock` tells instead what rock that moves leaves of the peaks
 of a layer on rigid rock, `--mesh` how the elements along the depth converge, and `--cones` how
-much damping cones have over that of buried discs and of layers.
+much damping cones have over that of buried discs and of layers, and how far stacks of cones are
+from a block in the ground.
 
     python -m benchmarks.ground [--rock | --mesh | --cones]
 """
@@ -187,6 +188,33 @@ def compare_cones() -> None:
             f'{motion} ' + ' '.join(f'{one:.2f}' for one in cone[:, dof, dof] / exact[:, dof, dof])
             for motion, dof in (('sliding', 0), ('vertical', 2), ('rocking', 4), ('torsion', 5)))
         print(f'damping of cones over that of a disc {name}, a0 = 0.5 1 2: {told}')
+    compare_stacks()
+
+
+def compare_stacks() -> None:
+    """Print how far stacks of cones are from thin layers, for blocks in a half-space."""
+    from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
+    from rotorsoil_ros.ground.layers.model import ThinLayerModel
+    from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+    from rotorsoil_ros.ground.soil import Circle, Soil
+
+    disc, a0 = Circle(1.0), np.linspace(0.05, HIGHEST, 60)
+    for ratio in (0.1, 0.25, 1.0 / 3.0, 0.45):
+        soil = Soil(1.0, ratio, 1.0, 0.05)
+        for depth in (0.25, 0.5, 1.0, 2.0):
+            found, exact = (model.compliance(a0) for model in (
+                EmbeddedConeModel(soil, disc, Embedment(depth)),
+                ThinLayerModel.solved(LayeredSoil((), soil), disc, omega_max=HIGHEST,
+                                      embedment=Embedment(depth))))
+            size = np.sqrt(np.abs(np.diagonal(exact, axis1=1, axis2=2)))
+            off = np.abs(found - exact) / (size[:, :, None] * size[:, None])
+            told = ', '.join(
+                f'{motion} ' + ' '.join(f'{off[a0 <= end][:, i, j].max():.0%}'
+                                        for end in (2.0, HIGHEST))
+                for motion, i, j in (('sliding', 0, 0), ('vertical', 2, 2), ('rocking', 4, 4),
+                                     ('torsion', 5, 5), ('coupling', 0, 4)))
+            print(f'stack of cones, nu {ratio:.2f}, embedded {depth:g} radii, a0 to 2 and '
+                  f'{HIGHEST:g}: {told}', flush=True)
 
 
 if __name__ == '__main__':

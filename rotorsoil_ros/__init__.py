@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
     from rotorsoil_ros.ground.boundary.site import Site
     from rotorsoil_ros.ground.cone import ConeModel
+    from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
     from rotorsoil_ros.ground.half_space import InfiniteElementModel
     from rotorsoil_ros.ground.layers.model import ThinLayerModel
     from rotorsoil_ros.ground.layers.profile import Embedment, Layer, LayeredSoil
@@ -70,14 +71,15 @@ __version__ = '0.1.0'
 __all__ = [
     'Bearing', 'BearingStates', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle',
     'Comparison', 'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DampingSplit',
-    'DampingSplitter', 'DesignReport', 'Disc', 'Embedment', 'Foundation', 'ImportedTable',
-    'InfiniteElementModel', 'InputError', 'JournalBearing', 'JournalStates', 'Layer',
-    'LayeredSiteModel', 'LayeredSoil', 'Machine', 'Matching', 'Material', 'NotSolvedError', 'Oil',
-    'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction', 'Predictor', 'Probe', 'Profile',
-    'Record', 'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
-    'ShaftSection', 'Site', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource', 'Study',
-    'ThinLayerModel', 'Transmissibility', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
-    'import_table', 'load', 'predict_many', 'read_profile', 'study',
+    'DampingSplitter', 'DesignReport', 'Disc', 'EmbeddedConeModel', 'Embedment', 'Foundation',
+    'ImportedTable', 'InfiniteElementModel', 'InputError', 'JournalBearing', 'JournalStates',
+    'Layer', 'LayeredSiteModel', 'LayeredSoil', 'Machine', 'Matching', 'Material',
+    'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction',
+    'Predictor', 'Probe', 'Profile', 'Record', 'Rectangle', 'Response', 'ResponseTable',
+    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel',
+    'SoilSpread', 'SpeedSource', 'Study', 'ThinLayerModel', 'Transmissibility', 'Verdict',
+    'Viscosity', 'Wish', 'compare', 'export_log', 'import_table', 'load', 'predict_many',
+    'read_profile', 'study',
 ]
 
 # Which room a public name lives in.
@@ -98,6 +100,7 @@ _ROOMS = {
     'ground.boundary.model': ('BoundaryElementModel',),
     'ground.boundary.site': ('Site',),
     'ground.cone': ('ConeModel',),
+    'ground.embedded_cone': ('EmbeddedConeModel',),
     'ground.half_space': ('InfiniteElementModel',),
     'ground.layers.model': ('ThinLayerModel',),
     'ground.layers.profile': ('Embedment', 'Layer', 'LayeredSoil'),

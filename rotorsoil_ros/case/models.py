@@ -27,6 +27,7 @@ from rotorsoil_ros.errors import InputError, solved
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, ThinLayerModel
 from rotorsoil_ros.ground.layers.profile import LayeredSoil, LEAST_LOSS_FACTOR
@@ -99,7 +100,9 @@ def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
         raise InputError(f'{case.path}: soil: is missing')
     contact = case.foundations[index].contact
     if case.support.model == 'cone':
-        return ConeModel(case.soil, contact)
+        embedment = case.embedments[index]
+        return (EmbeddedConeModel(case.soil, contact, embedment) if embedment.depth else
+                ConeModel(case.soil, contact))
     if case.ground is not None:
         return thin_layer_model(case.ground, contact, case.embedments[index], cache=cache,
                                 speed_range=case.speed_range)

@@ -10,6 +10,7 @@ import numpy as np
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.ground import (
     band_contents,
+    is_embedded,
     layers_told,
     model_error,
     of_neighbours,
@@ -326,6 +327,8 @@ def implausible(
 
 def _of_soil(case: Case, soil: Soil, foundation: Foundation) -> Iterator[str]:
     if case.support.model == 'cone':
+        if is_embedded(case, foundation):  # held against thin layers: `model_error`
+            return
         yield from _of_cones(soil, foundation, speed_range=case.speed_range)
     elif (case.support.model == 'infinite_elements'
           and soil.poisson_ratio > _LARGEST_POISSON_RATIO):

@@ -12,6 +12,7 @@ import numpy as np
 
 from rotorsoil_ros.case import cache, models
 from rotorsoil_ros.case.config import Case, load
+from rotorsoil_ros.case.design.shapes import embedded_model
 from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
     infinite_element_model,
@@ -104,6 +105,9 @@ def _soil_figures(
         if case.ground is not None:
             yield f'compliance_{block.name}', _site_figure(case, model, index, directory)
             continue
+        if case.embedments[index].depth:
+            yield f'compliance_{block.name}', _stack_figure(case, model, index, directory)
+            continue
         known: dict[str, SoilModel] = {'cone': ConeModel(case.soil, block.contact)}
         spans = []
         for label, solved in (('infinite elements', _infinite), ('boundary elements', _boundary)):
@@ -133,6 +137,18 @@ def _layers_figure(
     return compliance_figure(
         case.name, block, case.soil,
         {'on the surface, no layers': even, 'as given': layers}, omega)
+
+
+def _stack_figure(
+    case: Case, model: CoupledModel, index: int, directory: Path,
+) -> 'Figure':
+    """Return the compliance of cones in the ground beside that of thin layers."""
+    assert case.soil is not None
+    layers = embedded_model(case, index, cache.Cache(directory))
+    return compliance_figure(
+        case.name, model.foundations[index], case.soil,
+        {'stack of cones': model.soil_models[index], 'thin layers': layers},
+        np.linspace(0.0, layers.omega_range[1], _POINTS))
 
 
 def _site_figure(

@@ -9,6 +9,7 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel, static_scale
@@ -66,8 +67,8 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
     match model:
         case BoundaryElementModel():
             return model.on(soil)
-        case ConeModel():
-            return ConeModel(soil, contact)
+        case ConeModel() | EmbeddedConeModel():
+            return replace(model, soil=soil, contact=contact)
         case InfiniteElementModel(table=table):
             as_solved = replace(soil, poisson_ratio=table.poisson_ratio)
             table = replace(table, loss_factor=soil.loss_factor)
@@ -88,6 +89,7 @@ def without_loss(model: SoilModel, contact: Contact) -> SoilModel | None:
     """Return a model on the same soil without material damping; None where it knows of none."""
     if isinstance(model, RigidSoil):
         return model
-    if isinstance(model, (BoundaryElementModel, ConeModel, InfiniteElementModel)):
+    if isinstance(model, (BoundaryElementModel, ConeModel, EmbeddedConeModel,
+                          InfiniteElementModel)):
         return on_soil(model, replace(model.soil, loss_factor=0.0), contact)
     return None

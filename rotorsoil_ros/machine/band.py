@@ -14,6 +14,7 @@ from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
+from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
 from rotorsoil_ros.ground.neighbours import on_soil
@@ -239,8 +240,8 @@ def _response(predictor: Predictor, speed: FloatArray) -> ComplexArray:
 
 def depends_on_soil(model: CoupledModel) -> bool:
     """Return whether a machine stands on a soil that its model knows."""
-    return any(isinstance(soil, (BoundaryElementModel, ConeModel, InfiniteElementModel,
-                                 LayeredSiteModel, ThinLayerModel))
+    return any(isinstance(soil, (BoundaryElementModel, ConeModel, EmbeddedConeModel,
+                                 InfiniteElementModel, LayeredSiteModel, ThinLayerModel))
                for soil in model.soil_models)
 
 

@@ -32,15 +32,13 @@ _SOIL = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor')
 
 def layers_told(case: Case) -> Iterator[tuple[str, str]]:
     """Yield what each layer is, from the surface down, and how blocks stand in them."""
-    if case.ground is None:
-        return
-    top = 0.0
-    for number, (layer, bottom) in enumerate(zip(
-            case.ground.layers, case.ground.interfaces, strict=True), 1):
+    top, layers = 0.0, () if case.ground is None else case.ground.layers
+    for number, layer in enumerate(layers, 1):
+        bottom = top + layer.thickness
         yield f'layer {number}', (f'{top:.4g} to {bottom:.4g} m, c_s = '
                                   f'{layer.soil.shear_wave_speed:.4g} m/s')
         top = bottom
-    if case.ground.layers:
+    if case.ground is not None and layers:
         below = case.ground.below
         yield 'below', f'from {top:.4g} m, ' + (
             'rigid rock, a bound' if below is None else
@@ -76,21 +74,37 @@ def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) ->
         parts.append('infinite elements of a disc: within 0.5%')
     elif not isinstance(contact, Circle) or support == 'cone':
         what = f'{"cones under discs" if support == "cone" else "discs"} for {_shape(contact)}'
-        if shape is None:
+        if support == 'cone' and is_embedded(case, foundation):
+            parts.append(_of_stack(contact, shape))
+        elif shape is None:
             known = f'within {CONE_ERROR:.0%}' if isinstance(contact, Circle) else (
                 'not known, where boundary elements do not reach')
             parts.append(f'{what}: {known}')
         else:
-            where = ' on a half-space of the soil below it' if _is_embedded(
+            where = ' on a half-space of the soil below it' if is_embedded(
                 case, foundation) else ''
             parts.append(
-                f'{what}{where}: compliance off by up to {shape.share:.0%} over the speed range '
-                f'({shape.dof} at {rad_s_to_hz(shape.omega):.3g} Hz), against '
+                f'{what}{where}: {_off(shape)}, against '
                 f'{"infinite" if isinstance(contact, Circle) else "boundary"} elements')
     return '; '.join(parts)
 
 
-def _is_embedded(case: Case, foundation: Foundation) -> bool:
+def _off(shape: ShapeError) -> str:
+    return (f'compliance off by up to {shape.share:.0%} over the speed range '
+            f'({shape.dof} at {rad_s_to_hz(shape.omega):.3g} Hz)')
+
+
+def _of_stack(contact: Contact, shape: ShapeError | None) -> str:
+    """Return how far a stack of cones is from thin layers under the same discs."""
+    told = 'not known, where thin layers do not reach' if shape is None else (
+        f'{_off(shape)}, against thin layers')
+    if not isinstance(contact, Circle):
+        told += f'; that discs stand for {_shape(contact)} comes on top'
+    return f'stack of cones: {told}'
+
+
+def is_embedded(case: Case, foundation: Foundation) -> bool:
+    """Return whether a block stands in the ground."""
     return any(block.name == foundation.name and embedment.depth > 0.0
                for block, embedment in zip(case.foundations, case.embedments, strict=True))
 
@@ -116,7 +130,7 @@ def of_shapes(case: Case, shapes: Sequence[ShapeError | None]) -> Iterator[str]:
         if shape is not None and (ratio > _LARGEST_ASPECT or shape.share > _LARGEST_SHARE):
             yield (f'{block.name}: contact is {ratio:.3g} times as long as wide; '
                    f'{model_error(case, block, shape)}; ' + (
-                       'no model here knows the shape of a block in the ground' if _is_embedded(
+                       'no model here knows the shape of a block in the ground' if is_embedded(
                            case, block) else
                        f'support.model {BOUNDARY_ELEMENTS} takes it as it is'))
 
@@ -152,8 +166,8 @@ def of_neighbours(case: Case) -> Iterator[str]:
                    'taken as alone on the ground: a load on one moves the other by up to '
                    f'{coupling:.0%} of its own motion, and its own changes by up to {change:.0%} '
                    '(two squares on a half-space); ' + (
-                       'no model here couples blocks in the ground' if _is_embedded(
-                           case, block) or _is_embedded(case, other) else
+                       'no model here couples blocks in the ground' if is_embedded(
+                           case, block) or is_embedded(case, other) else
                        f'support.model {BOUNDARY_ELEMENTS} couples them'))
 
 
@@ -177,6 +191,8 @@ def _other_forms_of(case: Case) -> str:
     """Return which ground the band holds beside that of the case."""
     if case.support.model not in ('cone', 'infinite_elements') or case.soil is None:
         return ''
+    if any(embedment.depth for embedment in case.embedments):
+        return 'cones against thin layers'
     if not any(isinstance(block.contact, Circle) for block in case.foundations):
         return ('discs against boundary elements, blocks coupled'
                 if case.soil.poisson_ratio <= HIGHEST_POISSON_RATIO else

@@ -12,6 +12,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import INPUTS, UncertainInput
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.cone import ConeModel
+from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.plan import Part, Plan
@@ -26,6 +27,8 @@ from rotorsoil_ros.machine.spread import UNBALANCE
 _ALONE = np.linspace(-1.0, 1.0, 9)
 # Machines that are looked at closely at one speed: a band over all speeds has fewer.
 _CLOSER = 256
+# Models of the ground that are made for another contact at once.
+_REBUILT = (ConeModel, EmbeddedConeModel, InfiniteElementModel)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,13 +152,13 @@ def larger_block(model: CoupledModel, factor: float) -> CoupledModel | None:
     None where its ground would have to be solved anew.
     """
     blocks = tuple(_larger(block, factor) for block in model.foundations)
-    if not blocks or not all(isinstance(soil, (ConeModel, InfiniteElementModel))
+    if not blocks or not all(isinstance(soil, _REBUILT)
                              for soil in model.soil_models):
         return None
     return replace(model, foundations=blocks, soil_models=tuple(
         on_soil(soil, soil.soil, block.contact) for soil, block
         in zip(model.soil_models, blocks, strict=True)
-        if isinstance(soil, (ConeModel, InfiniteElementModel))))
+        if isinstance(soil, _REBUILT)))
 
 
 def _larger(block: Foundation, factor: float) -> Foundation:

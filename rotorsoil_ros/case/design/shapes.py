@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,15 @@ from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
     infinite_element_model,
     layered_site_model,
+    thin_layer_model,
 )
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.entries.site import site_of
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.accuracy import shape_error, ShapeError
 from rotorsoil_ros.ground.elements.table import require_kind
+from rotorsoil_ros.ground.layers.model import ThinLayerModel
+from rotorsoil_ros.ground.layers.profile import LayeredSoil, LEAST_LOSS_FACTOR
 from rotorsoil_ros.ground.soil import Circle, Soil, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.spread import SoilSpread
@@ -38,9 +42,10 @@ def shape_errors(
     """
     Return how far discs and cones are from the shape of each block over the speed range.
 
-    Against boundary elements of that block alone; a circle on cones against infinite elements.
-    A block in the ground is compared with its disc on the surface of a half-space of the soil
-    below its base. None where the model is exact, or the shape is beyond reach.
+    Against boundary elements of that block alone; a circle on cones against infinite elements;
+    cones of a block in the ground against thin layers under the same discs. The discs of such a
+    block are compared on the surface of a half-space of the soil below its base. None where the
+    model is exact, or the shape is beyond reach.
     """
     soil = case.soil
     if not _takes_discs(case) or soil is None:
@@ -73,6 +78,8 @@ def _shape_error(
         return infinite_element_model(soil, contact, 'disc', cache=cache,
                                       speed_range=case.speed_range)
 
+    if case.support.model == 'cone' and case.embedments[index].depth:
+        return shape_error(model, embedded_model(case, index, cache), omega)
     if isinstance(contact, Circle):
         return shape_error(model, disc(), omega) if case.support.model == 'cone' else None
     alone = site_of([block])
@@ -81,6 +88,17 @@ def _shape_error(
             case.ground, alone, cache=cache, speed_range=case.speed_range), omega)
     return shape_error(model if case.ground is None else disc(), boundary_element_model(
         soil, alone, cache=cache, speed_range=case.speed_range), omega)
+
+
+def embedded_model(
+    case: Case, index: int, cache: Cache, speed_range: tuple[float, float] | None = None,
+) -> ThinLayerModel:
+    """Return the thin layers that a block of a case, on cones in a half-space, is held against."""
+    assert case.soil is not None
+    lossy = replace(case.soil, loss_factor=max(case.soil.loss_factor, LEAST_LOSS_FACTOR))
+    return thin_layer_model(LayeredSoil((), lossy), case.foundations[index].contact,
+                            case.embedments[index], cache=cache,
+                            speed_range=speed_range or case.speed_range)
 
 
 def other_forms(
@@ -101,6 +119,9 @@ def other_forms(
     cache = Cache(directory)
     # Beyond the reach of either there is no other form: `band_contents` says so.
     with suppress(RotorSoilError):
+        if any(embedment.depth for embedment in case.embedments):
+            return [embedded_model(case, index, cache, speeds)
+                    for index in range(len(case.foundations))], stiffer
         if not any(isinstance(block.contact, Circle) for block in case.foundations):
             return [boundary_element_model(
                 case.soil, site_of(case.foundations), cache=cache, speed_range=speeds,
