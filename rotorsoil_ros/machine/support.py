@@ -11,7 +11,7 @@ import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
-from rotorsoil_ros.ground.rational import Continuation, typical_size
+from rotorsoil_ros.ground.continuation import Continuation, typical_size
 from rotorsoil_ros.ground.soil import (
     below_each,
     second_opinion_of,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.ground.soil import Rectangle, RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
 

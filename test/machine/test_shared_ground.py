@@ -109,9 +109,21 @@ def test_the_table_of_a_running_machine_holds_points_and_coupling(model):
 
 
 def test_modes_are_found_on_a_shared_ground(model):
-    found = critical_speeds(model, (20.0, 150.0))
+    found = critical_speeds(model, (20.0, 260.0))
     assert found
     assert all(0.0 < one.damping_ratio < 1.0 for one in found)
+
+
+def test_heavy_modes_do_not_depend_on_how_far_one_looks(model):
+    """A root of the ground stays where it is; one of a fit moves with the range of its samples."""
+    ends = (240.0, 260.0, 310.0)
+    found = [[(one.speed, one.damping_ratio) for one in critical_speeds(model, (20.0, end))]
+             for end in ends]
+    common = [np.array([own for own in one if own[0] < 0.95 * ends[0]]) for one in found]
+    assert [len(one) for one in common] == [len(common[-1])] * len(ends)
+    assert common[-1][:, 1].max() > 0.2
+    for one in common:
+        np.testing.assert_allclose(one, common[-1], rtol=0.01)
 
 
 def test_another_soil_goes_below_all_blocks(model):

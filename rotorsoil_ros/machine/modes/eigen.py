@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.rotor.whirl import ORBITS
 
 # Frequencies w = lambda / i with less real part than this share of |w| do not vibrate: they

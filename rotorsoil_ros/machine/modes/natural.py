@@ -7,7 +7,7 @@ import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import ACROSS
-from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.assembly import Rotor
@@ -127,4 +127,5 @@ def _vibrations(
     chosen = np.flatnonzero((frequency.real > _CREEPING * np.abs(frequency))
                             & (np.abs(frequency) <= span[1])
                             & (frequency.real >= within[0]) & (frequency.real <= within[1]))
+    chosen = chosen[compliance.persists(frequency[chosen])]
     return np.abs(frequency[chosen]), (rows @ vectors[motion, chosen]).T

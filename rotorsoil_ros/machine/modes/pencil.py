@@ -7,7 +7,8 @@ import numpy as np
 import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.ground.rational import Continuation, States
+from rotorsoil_ros.ground.continuation import Continuation
+from rotorsoil_ros.ground.rational import States
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.machine.modes.zones import Zone

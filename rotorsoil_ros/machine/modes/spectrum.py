@@ -9,7 +9,7 @@ import scipy.linalg
 
 from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
-from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
-from rotorsoil_ros.ground import rational
+from rotorsoil_ros.ground import continuation
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
@@ -414,7 +414,7 @@ def test_modes_beyond_what_is_known_of_the_soil_are_left_out():
 
 
 def test_modes_that_the_samples_do_not_determine_are_left_out(monkeypatch):
-    monkeypatch.setattr(rational, '_AGREED', -1.0)
+    monkeypatch.setattr(continuation, '_AGREED', -1.0)
     assert campbell(paper_machine(mass=4200.0), np.array([300.0]), 10).eigenvalue.size == 0
 
 
@@ -470,7 +470,7 @@ def test_mode_that_a_jumping_table_does_not_determine_is_an_error_and_not_left_o
 
 
 def test_diagram_tells_where_a_light_mode_is_missing(monkeypatch):
-    monkeypatch.setattr(rational, '_AGREED', -1.0)
+    monkeypatch.setattr(continuation, '_AGREED', -1.0)
     model = paper_machine(mass=4200.0)
     with pytest.raises(NotSolvedError, match='changes too abruptly about'):
         critical_speeds(model, (10.0, 900.0))
