@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
-from rotorsoil_ros.ground.rational import Continuation
+from rotorsoil_ros.ground.continuation import Continuation
 
 
 @dataclass(frozen=True)
