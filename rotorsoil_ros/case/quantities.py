@@ -1,7 +1,7 @@
 """In which unit a value of a case file is, and which values are refused at once."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 import math
 import re
 import tokenize
@@ -26,31 +26,33 @@ _WITH_UNIT = re.compile(
     r'([-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?:[eE][-+]?[0-9]{1,3})?)\s*'
     r'((?:[A-Za-zµμ°%Ω]+(?:\^[-+]?[0-9])?[ */·]{0,2}){1,6})')
 _OIL = re.compile(r'(?:(?:ISO ?)?VG ?)?([0-9]{1,4})', re.IGNORECASE)
+_SIDE = re.compile(r'([0-9]{1,3}(?:\.[0-9]{1,6})?) ?([LlRr])')
 _GRADE = re.compile(r'[Gg] ?([0-9]{1,5}(?:\.[0-9]{1,5})?)')
 
 
 def _number_in(unit: str, *, may_be_endless: bool = False) -> BeforeValidator:
     """Return a validator that takes finite numbers, or text of a number and its unit."""
+    return BeforeValidator(partial(_number, unit=unit, may_be_endless=may_be_endless))
+
+
+def _number(value: object, *, unit: str, may_be_endless: bool = False) -> float:
+    """Return a finite number, given as one or as text with its unit."""
     rule = f'must be a finite number{unit and f" in {unit}"}'
     if may_be_endless:
         rule = f'must be a number in {unit}, or .inf'
-
-    def validate(value: object) -> float:
-        if isinstance(value, str) and (found := _WITH_UNIT.fullmatch(value.strip())):
-            value = _converted(float(found[1]), found[2], unit, rule)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f'{rule}, got {shown(value)}')
-        if may_be_endless and value == math.inf:
-            return math.inf
-        if not math.isfinite(value):
-            raise ValueError(f'{rule}, got {value}')
-        if abs(value) > _LARGEST_NUMBER:
-            raise ValueError(f'{rule} of at most {_LARGEST_NUMBER:g}, got {value:g}')
-        if 0.0 < abs(value) < _SMALLEST_NUMBER:
-            raise ValueError(f'{rule}, 0 or at least {_SMALLEST_NUMBER:g}, got {value:g}')
-        return float(value)
-
-    return BeforeValidator(validate)
+    if isinstance(value, str) and (found := _WITH_UNIT.fullmatch(value.strip())):
+        value = _converted(float(found[1]), found[2], unit, rule)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f'{rule}, got {shown(value)}')
+    if may_be_endless and value == math.inf:
+        return math.inf
+    if not math.isfinite(value):
+        raise ValueError(f'{rule}, got {value}')
+    if abs(value) > _LARGEST_NUMBER:
+        raise ValueError(f'{rule} of at most {_LARGEST_NUMBER:g}, got {value:g}')
+    if 0.0 < abs(value) < _SMALLEST_NUMBER:
+        raise ValueError(f'{rule}, 0 or at least {_SMALLEST_NUMBER:g}, got {value:g}')
+    return float(value)
 
 
 def _converted(number: float, given: str, unit: str, rule: str) -> float:
@@ -118,6 +120,17 @@ def _oil_grade(value: object) -> int:
     return int(found[1])
 
 
+def _probe_angle(value: object) -> float | str:
+    """Return degrees from z towards x, or as a plant says it: 45L, 45R."""
+    if isinstance(value, str) and (found := _SIDE.fullmatch(value.strip())):
+        return f'{found[1]}{found[2].upper()}'
+    try:
+        return _number(value, unit='deg')
+    except ValueError as error:
+        raise ValueError('must be degrees from z towards x, or 45L or 45R as seen from the '
+                         f'driver, got {shown(value)}') from error
+
+
 def _file(value: object) -> str:
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise ValueError(f'must be the path of a file, got {shown(value)}')
@@ -160,6 +173,7 @@ Second = Annotated[float, _number_in('s'), Usual(0.0, 1e-5)]
 PerSecond = Annotated[float, _number_in('1/s'), Usual(0.0, 1.0)]
 PascalSecond = Annotated[float, _number_in('Pa s'), Usual(0.02, 0.06, 0.005)]
 Degree = Annotated[float, _number_in('deg'), Usual(60.0, 20.0, 120.0)]
+ProbeAngle = Annotated[float | str, BeforeValidator(_probe_angle), Usual(45.0, -45.0)]
 Celsius = Annotated[float, _number_in('degC'), Usual(45.0, 60.0, 30.0)]
 Radian = Annotated[float, _number_in('rad'), Usual(0.0, 1.0, 3.0)]
 Hertz = Annotated[float, _number_in('Hz'), Usual(20.0, 5.0, 80.0)]

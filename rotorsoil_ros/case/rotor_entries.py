@@ -54,21 +54,44 @@ class RotorEntries:
         shaft = faults.attempt_each(self._section, entries.shaft)
         discs = faults.attempt_each(self._disc, entries.discs)
         bearings = faults.attempt_each(self._bearing, entries.bearings)
-        if shaft is None or discs is None or bearings is None:
+        probes = faults.attempt_each(self._probe, entries.probes)
+        if shaft is None or discs is None or bearings is None or probes is None:
             return None
-        return faults.attempt(lambda: self._assembled(shaft, discs, bearings))
+        return faults.attempt(lambda: self._assembled(shaft, discs, bearings, probes))
 
     def _assembled(
         self, shaft: tuple[ShaftSection, ...], discs: tuple[Disc, ...],
-        bearings: tuple[Bearing, ...],
+        bearings: tuple[Bearing, ...], probes: tuple[Probe, ...],
     ) -> Rotor:
         entries = self.faults.entries.rotor
-        probes = tuple(Probe(entry.name, entry.position) for entry in entries.probes)
         external = entries.external_damping
         with self.faults.at('rotor', entry=entries):
             return Rotor(shaft_height=entries.shaft_height, shaft=shaft, discs=discs,
                          bearings=bearings, probes=probes,
                          drag=0.0 if external is None else external.mass)
+
+    def _probe(self, index: int, entry: schema.ProbeEntry) -> Probe:
+        angle = None if entry.angle_deg is None else math.radians(
+            self._degrees(('rotor', 'probes', index, 'angle_deg'), entry.angle_deg))
+        return Probe(entry.name, entry.position, angle, entry.relative_to or '')
+
+    def _degrees(self, place: Place, given: float | str) -> float:
+        """Return an angle from z towards x, which may be told as it is seen from the driver."""
+        if not isinstance(given, str):
+            if not -180.0 <= given <= 360.0:
+                raise self.faults.error(*place, problem='must be between -180 and 360 deg, from z '
+                                                        f'towards x, got {given:g}')
+            return given
+        driver, size = self.faults.entries.rotor.driver, float(given[:-1])
+        if driver is None:
+            raise self.faults.error('rotor', 'driver', problem=(
+                f'is missing, left or right: {given} of {".".join(map(str, place))} is as seen '
+                'from there'))
+        if size > 180.0:
+            raise self.faults.error(*place, problem=f'must be at most 180 deg to one side, '
+                                                    f'got {given}')
+        # Who looks along y, from the left end, has x at the right hand.
+        return size if (given[-1] == 'R') == (driver == 'left') else -size
 
     def _section(self, index: int, entry: Section) -> ShaftSection:
         place = ('rotor', 'shaft', index)

@@ -23,6 +23,7 @@ from rotorsoil_ros.case.quantities import (
     MetrePerSecondSquared,
     Name,
     Pascal,
+    ProbeAngle,
     Radian,
     Ratio,
     Rpm,
@@ -125,10 +126,12 @@ class DiscEntry(Entry):
 
 
 class ProbeEntry(Entry):
-    """Place on the shaft whose motion is wanted."""
+    """Place on the shaft whose motion is wanted, in which direction and relative to what."""
 
     name: Name
     position: Metre
+    angle_deg: ProbeAngle | None = None
+    relative_to: Name | None = None
 
 
 class RotorEntry(Loaded):
@@ -140,6 +143,7 @@ class RotorEntry(Loaded):
     discs: list[DiscEntry] = Field(default_factory=list)
     bearings: list[BearingEntry]
     oil_temperatures: list[Celsius] = Field(default_factory=list)
+    driver: Literal['left', 'right'] | None = None
     probes: list[ProbeEntry] = Field(default_factory=list)
 
 

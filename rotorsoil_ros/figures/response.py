@@ -20,7 +20,7 @@ from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.peaks import Peak, resolved_speeds, resonances
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
-from rotorsoil_ros.rotor.shaft import Probe
+from rotorsoil_ros.rotor.shaft import crossed, Probe
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Okabe and Ito: told apart by every eye, and in grey.
@@ -77,7 +77,7 @@ def channel_groups(case: Case) -> dict[str, list[Channel]]:
                      for channel in across(bearing.name, HOUSING)
                      if case.support.model != 'rigid' or bearing.pedestal is not None],
         'discs': [channel for disc in rotor.discs for channel in across(disc.name)],
-        'probes': [channel for probe in rotor.probes for channel in across(probe.name)],
+        'probes': [channel for probe in rotor.probes for channel in probe.channels],
     }
     if case.support.model != 'rigid':
         of_blocks = [Channel(block.name, '', dof) for block in case.foundations for dof in DOFS]
@@ -168,25 +168,28 @@ def drawn_criticals(
 def orbits(case: Case, predictor: Predictor, criticals: Sequence[CriticalSpeed]) -> Figure:
     """Draw the orbit of every station at critical speeds, a row for each."""
     rotor = case.rotor
-    stations = [*(across(bearing.name, JOURNAL) for bearing in rotor.bearings),
-                *(across(disc.name) for disc in rotor.discs),
-                *(across(probe.name) for probe in rotor.probes)]
+    here = np.eye(2)
+    stations = [(channels[0].place, channels, here) for channels in (
+        *(across(bearing.name, JOURNAL) for bearing in rotor.bearings),
+        *(across(disc.name) for disc in rotor.discs),
+        *(across(probe.name) for probe in rotor.probes if probe.angle is None))]
+    stations += [(pair.name, pair.channels, pair.turn) for pair in crossed(rotor.probes)]
     figure = Figure(figsize=(max(1.9 * len(stations) + 0.6, 6.5), 2.4 * len(criticals) + 0.6),
                     layout='constrained')
     rows = figure.subfigures(len(criticals), 1, squeeze=False)[:, 0]
     for critical, row in zip(criticals, rows, strict=True):
         motion = predictor.predict(np.array([critical.speed])).displacement[0]
         every = row.subplots(1, len(stations), squeeze=False)[0]
-        for channels, axes in zip(stations, every, strict=True):
-            x, z = (_over_a_turn(motion[predictor.channels.index(channel)])
-                    for channel in channels)
+        for (place, channels, turn), axes in zip(stations, every, strict=True):
+            seen = motion[[predictor.channels.index(channel) for channel in channels]]
+            x, z = (_over_a_turn(complex(amplitude)) for amplitude in turn @ seen)
             axes.plot(x, z, color=COLOURS[0])
             axes.plot(x[0], z[0], 'o', color=COLOURS[1], markersize=4)
             axes.set_aspect('equal', adjustable='datalim')
             axes.tick_params(labelsize=6)
             axes.locator_params(nbins=4)
             axes.grid(alpha=0.3)
-            axes.set_title(channels[0].place, fontsize=7)
+            axes.set_title(place, fontsize=7)
             axes.set_xlabel('x [um]', fontsize=7)
         every[0].set_ylabel('z [um]', fontsize=7)
         row.suptitle(title_of(critical), fontsize=8)

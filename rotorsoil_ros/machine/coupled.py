@@ -254,13 +254,16 @@ class CoupledModel:
         """Put loads on the channels, (c, k), into the order of ports, housings and blocks."""
         ports, housings, first = [], [], 0
         for rotor in self.rotors:
-            seats, end = first + 4 * len(rotor.bearings), first + len(rotor.channels)
-            pairs = loads[first:seats].reshape(-1, 2, 2, loads.shape[1])
+            end = first + len(rotor.channels)
+            # What a force at a channel does on the motions that it is made of.
+            own = loads[first:end] if rotor.view is None else rotor.view.T @ loads[first:end]
+            seats = 4 * len(rotor.bearings)
+            pairs = own[:seats].reshape(-1, 2, 2, loads.shape[1])
             journal, housing = (pairs[:, part].reshape(-1, loads.shape[1]) for part in (0, 1))
             housings.append(housing)
             if rotor is self.rotor:
                 slopes = np.zeros((2 * len(self.couples), loads.shape[1]))
-                ports = [journal, loads[seats:end], slopes]
+                ports = [journal, own[seats:], slopes]
             first = end
         return np.concatenate([*ports, *housings, loads[first:len(loads) - self._on_ground]])
 
@@ -384,8 +387,9 @@ class CoupledModel:
         displacement, force, first = [], [], 0
         for rotor, ports in zip(self.rotors, found.ports, strict=True):
             seats, own = 2 * len(rotor.bearings), slice(first, first + 2 * len(rotor.bearings))
-            displacement += [interleave(ports[:, :seats], found.housings[:, own]),
-                             ports[:, seats:2 * len(rotor.stations)]]
+            moved = np.concatenate([interleave(ports[:, :seats], found.housings[:, own]),
+                                    ports[:, seats:2 * len(rotor.stations)]], axis=1)
+            displacement.append(moved if rotor.view is None else rotor.view @ moved)
             force.append(interleave(found.through[:, own], found.through[:, own]))
             first = own.stop
         return (np.concatenate([*displacement, found.blocks, found.ground], axis=1),

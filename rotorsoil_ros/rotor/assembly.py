@@ -58,6 +58,11 @@ class Rotor:
                 raise RotorSoilError(f'position of {station.name} must be on the shaft, '
                                      f'0 to {length:g} m, got {station.position:g}')
 
+        names = [bearing.name for bearing in self.bearings]
+        for probe in self.probes:
+            if probe.relative_to and probe.relative_to not in names:
+                raise RotorSoilError(f'relative_to of {probe.name} must be one of '
+                                     f'{", ".join(names)}, got {probe.relative_to}')
         if any(section.axial_force < 0.0 for section in self.shaft):
             factor = self.buckling_factor
             if not factor > 1.0:
@@ -86,8 +91,32 @@ class Rotor:
         """Motions of journals and housings, bearing by bearing, then of discs and probes."""
         return (*(channel for bearing in self.bearings for part in (JOURNAL, HOUSING)
                   for channel in across(bearing.name, part)),
-                *(channel for station in self.stations[len(self.bearings):]
-                  for channel in across(station.name)))
+                *(channel for disc in self.discs for channel in across(disc.name)),
+                *(channel for probe in self.probes for channel in probe.channels))
+
+    @cached_property
+    def view(self) -> FloatArray | None:
+        """
+        What its channels are of the motions over (x, z) of all stations, (c, d).
+
+        Of journal and housing of each bearing, then of discs and probes. None where they are
+        just these.
+        """
+        if all(probe.angle is None and not probe.relative_to for probe in self.probes):
+            return None
+        plain = 4 * len(self.bearings) + 2 * len(self.discs)
+        whole = np.zeros((len(self.channels), plain + 2 * len(self.probes)))
+        whole[:plain, :plain] = np.eye(plain)
+        names, row = [bearing.name for bearing in self.bearings], plain
+        for index, probe in enumerate(self.probes):
+            rows = slice(row, row + len(probe.channels))
+            own = plain + 2 * index
+            whole[rows, own:own + 2] = probe.directions
+            if probe.relative_to:
+                housing = 4 * names.index(probe.relative_to) + 2
+                whole[rows, housing:housing + 2] = -probe.directions
+            row = rows.stop
+        return whole
 
     @property
     def length(self) -> float:

@@ -1,9 +1,17 @@
 """Pieces of a shaft with their material, and the places whose motion is wanted."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
 
+import numpy as np
+
+from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.channel import across, Channel
 from rotorsoil_ros.errors import require
+
+# Sine of the angle between two probes below which they look the same way.
+_PARALLEL = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +109,79 @@ class ShaftSection:
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """Station of the shaft whose motion is wanted: position along the shaft [m]."""
+    """
+    Station of the shaft whose motion is wanted.
+
+    Attributes
+    ----------
+    name : str
+        First part of its channels, or the whole of its one.
+    position : float
+        Along the shaft [m].
+    angle : float or None
+        Of the one direction in which it looks, from z (up) towards x [rad]; None is along x and
+        along z.
+    relative_to : str
+        Name of the bearing to whose housing it is fixed; empty of one that stands still.
+
+    """
 
     name: str
     position: float
+    angle: float | None = None
+    relative_to: str = ''
+
+    def __post_init__(self) -> None:
+        if self.angle is not None:
+            require(math.isfinite(self.angle), 'angle', 'finite, in rad', self.angle)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What it tells: along x and along z, or in its own direction."""
+        return across(self.name) if self.angle is None else (Channel(self.name, '', ''),)
+
+    @property
+    def directions(self) -> FloatArray:
+        """Of its channels over (x, z), (1 or 2, 2)."""
+        if self.angle is None:
+            return np.eye(2)
+        return np.array([[math.sin(self.angle), math.cos(self.angle)]])
+
+
+@dataclass(frozen=True, slots=True)
+class CrossedProbes:
+    """
+    Two probes that look at one place from two sides: together they see its orbit.
+
+    Attributes
+    ----------
+    name : str
+        Of both.
+    position : float
+        Along the shaft [m].
+    channels : tuple of two Channels
+        What they tell.
+    turn : (2, 2) float array
+        Motion over (x, z) per what they tell.
+
+    """
+
+    name: str
+    position: float
+    channels: tuple[Channel, Channel]
+    turn: FloatArray
+
+
+def crossed(probes: Sequence[Probe]) -> Iterator[CrossedProbes]:
+    """Yield the pairs of probes at one place that do not look the same way."""
+    left = [probe for probe in probes if probe.angle is not None]
+    while left:
+        one = left.pop(0)
+        for other in left:
+            seen = np.concatenate([one.directions, other.directions])
+            if ((other.position, other.relative_to) == (one.position, one.relative_to)
+                    and abs(np.linalg.det(seen)) > _PARALLEL):
+                left.remove(other)
+                yield CrossedProbes(f'{one.name}_{other.name}', one.position,
+                                    (one.channels[0], other.channels[0]), np.linalg.inv(seen))
+                break

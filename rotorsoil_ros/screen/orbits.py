@@ -14,6 +14,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import across, HOUSING, JOURNAL
 from rotorsoil_ros.events import Compared, NANOSECONDS
 from rotorsoil_ros.monitor.vectors.history import nearest
+from rotorsoil_ros.rotor.shaft import crossed
 from rotorsoil_ros.screen.bode import MEASURED, PREDICTED
 from rotorsoil_ros.screen.channels import MICRO, moving_housings
 from rotorsoil_ros.screen.chart import drawn_grid, Label, round_up, TEXT, written
@@ -37,9 +38,11 @@ class Cell:
     Attributes
     ----------
     station : str
-        First part of its two channels.
+        First part of its two channels, or the names of two probes.
     columns : tuple of two ints
-        Of the channels along x and z.
+        Of the channels along x and z, or in the directions of the probes.
+    turn : (2, 2) float array
+        Motion over (x, z) per what these channels tell.
     centre : (2,) float array
         Where in the plane.
     radii : deque of (int, float)
@@ -51,6 +54,7 @@ class Cell:
 
     station: str
     columns: tuple[int, int]
+    turn: FloatArray
     centre: FloatArray
     radii: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=64))
     measured: float = 0.0
@@ -71,14 +75,14 @@ class Cell:
         return known[-1] if known else self.radii[0][1] if self.radii else math.nan
 
     def path(self, vector: ComplexArray, radius: float) -> FloatArray:
-        """Return the orbit of (x, z) [m] in the plane, where z goes up and its own y down."""
-        along = vector * (1.0, -1.0) * MICRO / radius
+        """Return the orbit of its channels [m] in the plane, z up where its own y goes down."""
+        along = (self.turn @ vector) * (1.0, -1.0) * MICRO / radius
         return self._placed(np.real(along[None] * np.exp(1j * TURN)[:, None]))
 
     def box(self, size: FloatArray, radius: float) -> FloatArray:
         """Return between which ends an orbit lies whose phases nobody knows."""
         corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)])
-        return self._placed(corners * size * MICRO / radius)
+        return self._placed((corners * size) @ self.turn.T * (1.0, -1.0) * MICRO / radius)
 
     def _placed(self, offsets: FloatArray) -> FloatArray:
         reach = np.linalg.norm(offsets, axis=1, keepdims=True)
@@ -226,17 +230,24 @@ class Track:
 def cells(case: Case, channels: Sequence[str]) -> list[Cell]:
     """Return the circles of a machine, along its shaft; housings that stand on soil below."""
     rotor = case.rotor
-    on_shaft = [(bearing.position, across(bearing.name, JOURNAL)) for bearing in rotor.bearings]
-    on_shaft += [(disc.position, across(disc.name)) for disc in rotor.discs]
-    on_shaft += [(probe.position, across(probe.name)) for probe in rotor.probes]
+    here = np.eye(2)
+    on_shaft = [(bearing.position, bearing.name, across(bearing.name, JOURNAL), here)
+                for bearing in rotor.bearings]
+    on_shaft += [(disc.position, disc.name, across(disc.name), here) for disc in rotor.discs]
+    on_shaft += [(probe.position, probe.name, across(probe.name), here)
+                 for probe in rotor.probes if probe.angle is None]
+    on_shaft += [(pair.position, pair.name, pair.channels, pair.turn)
+                 for pair in crossed(rotor.probes)]
     moving = moving_housings(case)
-    housings = [(bearing.position, across(bearing.name, HOUSING)) for bearing in rotor.bearings
-                if bearing.name in moving]
+    housings = [(bearing.position, bearing.name, across(bearing.name, HOUSING), here)
+                for bearing in rotor.bearings if bearing.name in moving]
     found = []
-    for row, stations in enumerate((sorted(on_shaft), sorted(housings))):
-        for column, (_, (x, z)) in enumerate(stations):
-            if x in channels and z in channels:
-                found.append(Cell(x.place, (channels.index(x), channels.index(z)),
+    for row, stations in enumerate((on_shaft, housings)):
+        along = sorted(stations, key=lambda station: station[:3])
+        for column, (_, name, (first, second), turn) in enumerate(along):
+            if first in channels and second in channels:
+                place = first.place if first.axis else name
+                found.append(Cell(place, (channels.index(first), channels.index(second)), turn,
                                   np.array([column * PITCH, row * ROW])))
     return found
 

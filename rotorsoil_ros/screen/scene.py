@@ -94,7 +94,9 @@ class Scene:
         places = [(across(bearing.name, JOURNAL), bearing.position, 0.0)
                   for bearing in rotor.bearings]
         places += [(across(disc.name), disc.position, disc_radius(disc)) for disc in rotor.discs]
-        places += [(across(probe.name), probe.position, 0.0) for probe in rotor.probes]
+        # What moves with a housing, or is seen from one side, is no place of the shaft.
+        places += [(across(probe.name), probe.position, 0.0) for probe in rotor.probes
+                   if probe.angle is None and not probe.relative_to]
         self.stations = sorted(
             (Station(x.station, y, radius, index[x], index[z]) for (x, z), y, radius in places),
             key=lambda station: station.y)
