@@ -78,7 +78,8 @@ class BlockEntries:
             mass, centre, inertia = self._body(index, entry, contact)
             along = entry.centre_y
             if along is None:  # without a seat it is never used: what is wrong has been kept
-                along = 0.5 * (min(seats) + max(seats)) if seats else 0.0
+                upright = self.faults.entries.rotor.orientation == 'vertical'
+                along = 0.5 * (min(seats) + max(seats)) if seats and not upright else 0.0
             # A plan turns about its centroid; its parts are placed about the keys' centre.
             x, y = contact.centroid if isinstance(contact, Plan) else (0.0, 0.0)
             product = 0.0

@@ -274,6 +274,11 @@ class JournalEntries:
         entries = self.faults.entries.rotor.bearings
         if all(entry.load is not None for entry in entries if entry.journal is not None):
             return [np.array(entry.load or (0.0, 0.0)) for entry in entries]
+        for index, entry in enumerate(entries):
+            if rotor.is_upright and entry.journal is not None and entry.load is None:
+                raise self.faults.error('rotor', 'bearings', index, 'load', problem=(
+                    'is missing, in N: a shaft that stands upright lays no weight on '
+                    f'{entry.name}'))
         compliance = np.diag([
             sinking(bearing, on_film=entry.journal is not None)
             for bearing, entry in zip(rotor.bearings, entries, strict=True)])

@@ -42,6 +42,7 @@ from rotorsoil_ros.machine.band import (
     ResponseBand,
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 from rotorsoil_ros.machine.spread import Place, SoilSpread
 
@@ -75,7 +76,8 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
     with solved('the ground under this machine'):
         soils = soil_models(case, directory)
     return CoupledModel(case.rotor, case.foundations, soils, case.couples,
-                        tuple(probe.name for probe in case.ground_probes))
+                        tuple(probe.name for probe in case.ground_probes),
+                        Placement(is_upright=case.rotor.is_upright))
 
 
 def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:

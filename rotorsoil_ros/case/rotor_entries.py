@@ -68,7 +68,8 @@ class RotorEntries:
         with self.faults.at('rotor', entry=entries):
             return Rotor(shaft_height=entries.shaft_height, shaft=shaft, discs=discs,
                          bearings=bearings, probes=probes,
-                         drag=0.0 if external is None else external.mass)
+                         drag=0.0 if external is None else external.mass,
+                         is_upright=entries.orientation == 'vertical')
 
     def _probe(self, index: int, entry: schema.ProbeEntry) -> Probe:
         angle = None if entry.angle_deg is None else math.radians(

@@ -11,6 +11,7 @@ from rotorsoil_ros.case.quantities import (
     BalanceGrade,
     Celsius,
     Count,
+    Degree,
     FileName,
     Hertz,
     Kilogram,
@@ -143,6 +144,7 @@ class RotorEntry(Loaded):
     discs: list[DiscEntry] = Field(default_factory=list)
     bearings: list[BearingEntry]
     oil_temperatures: list[Celsius] = Field(default_factory=list)
+    orientation: Literal['horizontal', 'vertical'] = 'horizontal'
     driver: Literal['left', 'right'] | None = None
     probes: list[ProbeEntry] = Field(default_factory=list)
 
@@ -228,6 +230,7 @@ class PickupEntry(Entry):
     range: MetrePerSecondSquared | None = None
     units: Literal['m/s^2', 'g'] | None = None
     orientation: Literal['use'] | None = None
+    heading_deg: Degree | None = None
     stamps: Literal['packets'] | None = None
     anti_alias: StrictBool | None = None
 

@@ -72,6 +72,9 @@ def derived_quantities(
     low, high = case.speed_range
     yield 'case', f'{case.name} ({case.path})'
     yield 'speed range', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm'
+    if case.rotor.is_upright:
+        yield 'orientation', ('vertical: y along the shaft is up, x and z are horizontal, z '
+                              'against y of the ground')
     yield 'rotor mass', f'{case.rotor.mass:.4g} kg'
     yield 'mesh', f'{len(case.rotor.node_positions)} nodes on {case.rotor.length:g} m of shaft'
     planes = [*((disc.name, 'kg m') for disc in case.rotor.discs),

@@ -22,15 +22,19 @@ class Placement:
         Of the shaft's own axes about z, from the x of the ground towards its y [rad]. A shaft
         that turns the other way round is one that points the other way, heading pi: so the spin
         is positive for all.
+    is_upright : bool
+        Whether the shaft points up, over that place: its own x then is horizontal still, and so is
+        its z, which points against the y of the ground where the heading is zero.
 
     """
 
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
+    is_upright: bool = False
 
     def __post_init__(self) -> None:
-        for own, unit in zip(fields(self), ('m', 'm', 'rad'), strict=True):
+        for own, unit in zip(fields(self)[:3], ('m', 'm', 'rad'), strict=True):
             value = getattr(self, own.name)
             require(math.isfinite(value), own.name, f'finite, in {unit}', value)
 
@@ -38,12 +42,13 @@ class Placement:
         self, *, position: float, height: float, centre: tuple[float, float],
     ) -> FloatArray:
         """
-        Return x and z, across the shaft and up, of a seat per unit motion of its block.
+        Return x and z, both across the shaft, of a seat per unit motion of its block.
 
         Parameters
         ----------
         position, height : float
-            Of the seat along the shaft and above the contact [m].
+            Of the seat along the shaft, and of the shaft above the contact: of its axis where it
+            lies, of its lower end where it stands [m].
         centre : tuple of two floats
             x and y of the centre of the contact in the axes of the ground [m].
 
@@ -58,6 +63,12 @@ class Placement:
 
         """
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        if self.is_upright:
+            x, y, z = self.x - centre[0], self.y - centre[1], height + position
+            return np.array([
+                [cosine, sine, 0.0, -sine * z, cosine * z, sine * x - cosine * y],
+                [sine, -cosine, 0.0, cosine * z, sine * z, -cosine * x - sine * y],
+            ])
         across = self.x - sine * position - centre[0]
         along = self.y + cosine * position - centre[1]
         return np.array([

@@ -127,7 +127,7 @@ class Support:
     @cached_property
     def firm_rows(self) -> FloatArray:
         """Motion per unit motion (x, y, z) of the ground, (2 b, 3), of what stands on no block."""
-        on_ground = Placement(heading=self.place.heading).seat_rows(
+        on_ground = replace(self.place, x=0.0, y=0.0).seat_rows(
             position=0.0, height=0.0, centre=(0.0, 0.0))[:, :3]
         return np.concatenate([np.zeros((0, 3)), *(
             on_ground * (bearing.foundation is None) for bearing in self.bearings)])

@@ -35,6 +35,8 @@ class Rotor:
         Stations; each becomes a node of the mesh.
     drag : float
         Damping of the discs that does not turn, proportional to their mass [1/s].
+    is_upright : bool
+        Whether the shaft points up: its weight then is along it.
 
     """
 
@@ -44,6 +46,7 @@ class Rotor:
     bearings: tuple[Bearing, ...]
     probes: tuple[Probe, ...] = ()
     drag: float = 0.0
+    is_upright: bool = False
 
     def __post_init__(self) -> None:
         require(math.isfinite(self.shaft_height), 'shaft_height', 'finite, in m',

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rotorsoil_ros as rs
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.rotor.shaft import ShaftDamping
@@ -83,3 +84,39 @@ def test_bad_loads_and_losses_are_one_line_each(setting, said):
 def test_bad_coefficients_are_told_where_they_stand(old, new, said):
     assert old in SEAL
     assert said in [line[:len(said)] for line in refused(SEAL.replace(old, new))]
+
+
+def test_machine_that_stands_rocks_its_block_alike_both_ways():
+    # On a square block a round rotor on equal bearings has one response along x and along z.
+    case = Path(__file__).parents[2] / 'config' / 'paper_rotor.yaml'
+    machine = rs.load(case, **{'rotor.orientation': 'vertical', 'rotor.shaft_height': 0.2,
+                               'foundations.0.centre_y': None})
+    found = machine.response(rpm=[900.0, 2000.0])
+    block = machine.case.foundations[0]
+    assert (block.centre_x, block.centre_y) == (0.0, 0.0)
+    columns = {str(name): found.displacement[:, index]
+               for index, name in enumerate(found.channels)}
+    x, z = columns['disc_2_x'], columns['disc_2_z']
+    # Forward whirl on a round support: x follows z by a quarter of a turn.
+    np.testing.assert_allclose(x, -1j * z, rtol=1e-6)
+    np.testing.assert_allclose(columns['block_x'], 1j * columns['block_y'], rtol=1e-6)
+    np.testing.assert_allclose(np.abs(columns['block_rx']), np.abs(columns['block_ry']), rtol=1e-6)
+    assert np.abs(columns['block_z']).max() < 1e-12 * np.abs(columns['block_x']).max()
+
+
+def test_shaft_that_stands_lays_no_weight_on_a_journal():
+    journal = ('rotor.bearings.0={name: b, position: 0.0, journal: {type: plain, diameter: 0.02, '
+               'length: 0.02, radial_clearance: 2e-5, viscosity: 0.02}}')
+    assert refused(journal, 'rotor.orientation=vertical') == [
+        'rotor.bearings.0.load: is missing, in N: a shaft that stands upright lays no weight on b']
+    assert refused('rotor.orientation=upright') == [
+        "rotor.orientation: must be 'horizontal' or 'vertical', got 'upright'"]
+
+
+def test_heading_of_a_pickup_is_told_or_its_messages_tell_it():
+    assert load(PAPER, ['sensors={heading_deg: 90}']).sensors.usual.heading == pytest.approx(
+        0.5 * np.pi)
+    assert refused('sensors={heading_deg: 400}') == [
+        'sensors.heading_deg: must be between -360 and 360 deg, got 400']
+    assert refused('sensors={heading_deg: 30, orientation: use}') == [
+        'sensors.heading_deg: must not stand beside orientation: use, which tells it, got 30']

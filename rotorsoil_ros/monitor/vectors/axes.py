@@ -24,6 +24,9 @@ _UPRIGHT = math.radians(10.0)
 # orientation is used, it may stray from its mean by less [rad].
 _TURNED, _STRAYS = math.radians(5.0), math.radians(2.0)
 
+# Axes of a machine that stands over those of the ground: its y is up, its z against y.
+_STANDING = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
 # Columns of what a sensor says with each sample: three axes, then a quaternion x, y, z, w.
 _FELT, _QUATERNION, _WIDTH = slice(0, 3), slice(3, 7), 7
 
@@ -76,7 +79,10 @@ class Axes:
         """
         felt, quaternion = said[:, _FELT], said[:, _QUATERNION]
         self._see(felt, quaternion, seconds)
-        to_machine = np.eye(3)
+        to_machine = _heading(self._pickup)
+        if self._pickup.heading and not np.isfinite(felt).all():
+            return Refusal(Flaw.TURNED, 'the sensor has a heading, but not every sample has three '
+                                        'axes')
         if self._pickup.has_orientation:
             if not np.isfinite(said).all():
                 return Refusal(Flaw.TURNED, 'the orientation is to be used, but not every sample '
@@ -85,18 +91,21 @@ class Axes:
             if (strays := float(np.max(_apart(quaternion, mean)))) > _STRAYS:
                 return Refusal(Flaw.TURNED, 'the orientation of the sensor strays by '
                                             f'{math.degrees(strays):.0f} deg from its mean')
-            to_machine = _matrix(mean)
+            to_machine = _matrix(mean) if not self._pickup.is_upright else (
+                _STANDING @ _matrix(mean))
             values = felt @ to_machine[self._column]
         elif (tilt := _largest_turn(quaternion)) > _TURNED:
             return Refusal(Flaw.TURNED, 'the orientation of the sensor turns its axes by '
                                         f'{math.degrees(tilt):.0f} deg')
+        elif self._pickup.heading:
+            values = felt @ to_machine[self._column]
         refusal = self._against_gravity(to_machine)
         return values if refusal is None else refusal
 
     def peaks(self, values: FloatArray, said: FloatArray) -> FloatArray:
         """Return the largest (n,) that the sensor felt along the axes that count [m/s^2]."""
-        return np.abs(said[:, _FELT]).max(axis=1) if self._pickup.has_orientation else (
-            np.abs(values))
+        turns = self._pickup.has_orientation or self._pickup.heading
+        return np.abs(said[:, _FELT]).max(axis=1) if turns else np.abs(values)
 
     def words(self) -> str:
         """Return what gravity says of unit and axes; empty while it is not known."""
@@ -127,11 +136,20 @@ class Axes:
         if units == 'g' and _GRAVITY[0] <= size / STANDARD_GRAVITY <= _GRAVITY[1]:
             return Refusal(Flaw.UNITS, 'looks like m/s^2, not g as the case says: the mean of '
                                        f'three axes is {size / STANDARD_GRAVITY:.3g}')
-        tilt = math.atan2(math.hypot(mean[0], mean[1]), abs(mean[2]))
+        up = 1 if self._pickup.is_upright else 2
+        tilt = math.atan2(float(np.linalg.norm(np.delete(mean, up))), abs(mean[up]))
         if _GRAVITY[0] <= size <= _GRAVITY[1] and tilt > _UPRIGHT:
             return Refusal(Flaw.AXES, 'axes are not those of the machine: gravity is '
-                                      f'{math.degrees(tilt):.0f} deg off z')
+                                      f'{math.degrees(tilt):.0f} deg off {"xyz"[up]}')
         return None
+
+
+def _heading(pickup: Pickup) -> FloatArray:
+    """Return the matrix (3, 3) from axes of a sensor that is turned about the vertical."""
+    cosine, sine = math.cos(pickup.heading), math.sin(pickup.heading)
+    about_z = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    # The same turn of a machine whose vertical is its y.
+    return _STANDING @ about_z @ _STANDING.T if pickup.is_upright else about_z
 
 
 def _largest_turn(quaternion: FloatArray) -> float:

@@ -148,6 +148,35 @@ def test_orientation_that_is_used_gives_the_vector_of_the_machine(axis, degrees,
     assert refusals.counts[Flaw.TURNED] == refusals.stretches
 
 
+@pytest.mark.parametrize('degrees', [90.0, -35.0])
+def test_sensor_with_a_heading_is_turned_about_the_vertical(degrees):
+    time, felt = shaken(12.0)
+    own = turned(felt, (0.0, 0.0, 1.0), -degrees)
+    found, refusals = demodulated(time, own, heading=math.radians(degrees))
+    [straight], _ = demodulated(time, felt)
+    assert not refusals.counts
+    np.testing.assert_allclose(found[0].amplitude, straight.amplitude, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize('pickup', [{}, {'heading': math.radians(50.0)}, {'turned': True}])
+def test_machine_that_stands_has_its_gravity_along_the_shaft(pickup):
+    # Over the ground its x is x, its y is up and its z points against y.
+    time, felt = shaken(12.0)
+    standing = felt @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    [straight], _ = demodulated(time, felt)
+    if 'turned' in pickup:  # its messages tell how it lies over the ground
+        own, pickup = turned(felt, (1.0, 2.0, 2.0), -70.0), {'has_orientation': True}
+        orientation = np.tile(quaternion((1.0, 2.0, 2.0), 70.0), (len(time), 1))
+    else:
+        own = turned(standing, (0.0, 1.0, 0.0), -math.degrees(pickup.get('heading', 0.0)))
+        orientation = None
+    found, refusals = demodulated(time, own, orientation=orientation, is_upright=True, **pickup)
+    assert not refusals.counts
+    np.testing.assert_allclose(found[0].amplitude, straight.amplitude, rtol=1e-9, atol=1e-15)
+    _, refusals = demodulated(time, felt, is_upright=True)
+    assert 'gravity is 90 deg off y' in next(refusals.lines())
+
+
 def test_orientation_that_does_not_fit_gravity_is_refused():
     time, felt = shaken(3.0)
     found, refusals = demodulated(
