@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.case.design.variants import Study, study
     from rotorsoil_ros.case.journal_entries import BearingStates
     from rotorsoil_ros.case.machine import load, Machine
+    from rotorsoil_ros.case.plant.together import Plant, Shaken
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
     from rotorsoil_ros.events import Profile
@@ -74,9 +75,9 @@ __all__ = [
     'DampingSplitter', 'DesignReport', 'Disc', 'EmbeddedConeModel', 'Embedment', 'Foundation',
     'ImportedTable', 'InfiniteElementModel', 'InputError', 'JournalBearing', 'JournalStates',
     'Layer', 'LayeredSiteModel', 'LayeredSoil', 'Machine', 'Matching', 'Material',
-    'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Prediction',
+    'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Plant', 'Prediction',
     'Predictor', 'Probe', 'Profile', 'Record', 'Rectangle', 'Response', 'ResponseTable',
-    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Site', 'Soil', 'SoilModel',
+    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Shaken', 'Site', 'Soil', 'SoilModel',
     'SoilSpread', 'SpeedSource', 'Study', 'ThinLayerModel', 'Transmissibility', 'Verdict',
     'Viscosity', 'Wish', 'compare', 'export_log', 'import_table', 'load', 'predict_many',
     'read_profile', 'study',
@@ -93,6 +94,7 @@ _ROOMS = {
     'case.design.variants': ('Study', 'study'),
     'case.journal_entries': ('BearingStates',),
     'case.machine': ('Machine', 'load'),
+    'case.plant.together': ('Plant', 'Shaken'),
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
     'events': ('Profile',),

@@ -67,7 +67,9 @@ class BlockEntries:
 
     def _foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
         seats = self._seats(entry)
-        coupled = self.faults.entries.support.model == BOUNDARY_ELEMENTS
+        # Another machine, or the ground between blocks, may need one that carries none of this.
+        coupled = bool(self.faults.under) or (
+            self.faults.entries.support.model == BOUNDARY_ELEMENTS)
         if not seats and not self._is_undecided and not (
                 coupled and entry.centre_y is not None):
             self.faults.found.append(self.faults.error('foundations', index, problem=(

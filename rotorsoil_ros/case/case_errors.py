@@ -8,14 +8,20 @@ from pathlib import Path
 import re
 from typing import TypeVar
 
+from pydantic import ValidationError
+
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.case.entries.bearing import BearingEntry
-from rotorsoil_ros.case.entries.entry import Entry, Place
+from rotorsoil_ros.case.entries.entry import Entry, faults, Place
 from rotorsoil_ros.errors import InputError, RotorSoilError
 
 T = TypeVar('T')
 E = TypeVar('E')
+M = TypeVar('M', bound=Entry)
+
+# Keys that a machine of several has for itself.
+_OF_MACHINE = ('rotor', 'unbalances', 'speed_range_rpm')
 
 
 def message(path: Path, place: Place, problem: str) -> str:
@@ -38,6 +44,14 @@ def place_of(error: InputError) -> Place:
     return error.place if isinstance(error, CaseError) else ()
 
 
+def validated(kind: type[M], path: Path, content: object) -> tuple[M | None, list[InputError]]:
+    """Return what a document says as entries, or all that is wrong with their form."""
+    try:
+        return kind.model_validate(content), []
+    except ValidationError as error:
+        return None, [CaseError(path, place, problem) for place, problem in faults(error)]
+
+
 @dataclass(frozen=True)
 class Faults:
     """
@@ -51,12 +65,15 @@ class Faults:
         What it says.
     found : list of InputError
         Faults that were met so far, a line each.
+    under : tuple
+        Place of the machine in the file of a plant, below which its own keys stand.
 
     """
 
     path: Path
     entries: schema.Document
     found: list[InputError] = field(default_factory=list)
+    under: Place = ()
 
     def attempt(self, build: Callable[[], T]) -> T | None:
         """Return what is built, or keep what is wrong with it for later, and return None."""
@@ -95,6 +112,8 @@ class Faults:
 
     def error(self, *place: int | str, problem: str) -> CaseError:
         """Return the error to raise at a key."""
+        if place and place[0] in _OF_MACHINE:
+            place = (*self.under, *place)
         return CaseError(self.path, place, problem)
 
     def names_differ(self) -> bool:

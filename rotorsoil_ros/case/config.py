@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case import cache, document, schema, stiffness_file
 from rotorsoil_ros.case.block_entries import BlockEntries
-from rotorsoil_ros.case.case_errors import CaseError, Faults
-from rotorsoil_ros.case.entries.entry import faults, Place
+from rotorsoil_ros.case.case_errors import Faults, validated
+from rotorsoil_ros.case.entries.entry import Place
 from rotorsoil_ros.case.entries.ground import (
     GroundEntries,
     infinite_range,
@@ -23,8 +21,11 @@ from rotorsoil_ros.case.entries.mending import all_faults
 from rotorsoil_ros.case.entries.sensors import Sensors, sensors_of
 from rotorsoil_ros.case.entries.site import GroundProbe, SiteEntries
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
+from rotorsoil_ros.case.plant.berth import Berth
+from rotorsoil_ros.case.plant.entries import PlantDocument
+from rotorsoil_ros.case.plant.machines import case_among
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
-from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits
+from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits, zones_of
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.elements.table import require_kind
@@ -84,6 +85,8 @@ class Case:
         Those of its bearings that are given by their geometry.
     oil_temperatures : tuple of float
         Mean temperatures of the films for which there are tables besides [deg C].
+    berth : Berth or None
+        Where it stands among the machines of a plant; None alone.
     cache_directory : Path or None
         Where the tables of their films lie; None is the usual one.
     content : mapping
@@ -111,6 +114,7 @@ class Case:
     sensors: Sensors = field(default_factory=Sensors)
     journals: tuple[Journal, ...] = field(default=(), compare=False)
     oil_temperatures: tuple[float, ...] = ()
+    berth: Berth | None = None
     cache_directory: Path | None = field(default=None, compare=False, repr=False)
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
@@ -193,22 +197,29 @@ def case_of(
         As `load`.
 
     """
+    texts = dict(files or {})
+    schema_of = PlantDocument if 'machines' in content else schema.Document
+
     def read(
         content: dict[str, Any], mended: frozenset[Place] = frozenset(),
     ) -> tuple[Case | None, list[InputError]]:
-        try:
-            entries = schema.Document.model_validate(content)
-        except ValidationError as error:
-            return None, [CaseError(path, place, problem) for place, problem in faults(error)]
+        entries, found = validated(schema_of, path, content)
+        solves_films = not any(place[0] in _CARRIED for place in mended)
+
+        def build(told: Faults) -> Case | None:
+            return _Builder(told, content, texts, cache_directory, solves_films).case()
+
+        if isinstance(entries, PlantDocument):
+            return case_among(path, entries, texts, build)
+        if not isinstance(entries, schema.Document):
+            return None, found
         told = Faults(path, entries)
-        builder = _Builder(told, content, dict(files or {}), cache_directory,
-                           solves_films=not any(place[0] in _CARRIED for place in mended))
-        return builder.case(), told.found
+        return build(told), told.found
 
     case, found = read(content)
     if case is None or found:
         raise InputError('\n'.join(map(str, all_faults(
-            schema.Document, content, found, lambda *mended: read(*mended)[1]))))
+            schema_of, content, found, lambda *mended: read(*mended)[1]))))
     return case
 
 
@@ -251,7 +262,8 @@ class _Builder:
         if rotor is not None and speed_range is not None:
             journals = self._journals().journals(rotor, speed_range)
         oils = faults.attempt(self._journals().oil_temperatures)
-        uncertainty, zones = faults.attempt(self._uncertainty), faults.attempt(self._zones)
+        uncertainty = faults.attempt(self._uncertainty)
+        zones = faults.attempt(lambda: zones_of(faults))
         model, sensors = None, None
         if names_differ and rotor is not None and foundations is not None:
             model = self._model(rotor, foundations, unbalances.couples())
@@ -372,25 +384,6 @@ class _Builder:
         given = {} if entry is None else entry.model_dump(exclude_none=True)
         with self.faults.at('uncertainty', entry=entry):
             return SoilSpread(**given)
-
-    def _zones(self) -> ZoneLimits:
-        """Return the limits of a group, or those that the file gives itself."""
-        entry = self.faults.entries.zones or schema.ZonesEntry()
-        own = (entry.label, entry.rigid, entry.flexible, entry.rigid_displacement,
-               entry.flexible_displacement)
-        given = any(part is not None for part in own)
-        if entry.group is not None and given:
-            raise self.faults.error('zones', problem='needs either group, or label, rigid and '
-                                                     'flexible, got both')
-        with self.faults.at('zones', entry=entry):
-            if not given:
-                return replace(ISO_10816_3[entry.group or USUAL_GROUP], baseline=entry.baseline)
-            label, rigid, flexible, *displacements = own
-            if label is None or rigid is None or flexible is None:
-                raise self.faults.error('zones', problem='needs label, rigid and flexible '
-                                                         'together')
-            return ZoneLimits(label, rigid, flexible, displacements[0], displacements[1],
-                              entry.baseline)
 
     def _speed_range(self) -> tuple[float, float]:
         low, high = self.faults.entries.speed_range_rpm

@@ -1,6 +1,6 @@
 """What does a machine on its soil answer? A case with its models, asked in plant units."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
@@ -54,6 +54,12 @@ class Machine(ModalAnswers):
         """Read a case; settings `key.path=value` replace or add to what the file says."""
         case = config.load(case_file, overrides, cache_directory=cache_directory)
         return cls(case, cache.directory(cache_directory))
+
+    def others(self) -> Iterator['Machine']:
+        """Yield the machines of the same plant that run beside it, each as the source."""
+        berth = self.case.berth
+        for name in () if berth is None else berth.running_beside:
+            yield Machine(self.case.changed([f'source={name}']), self.directory)
 
     @cached_property
     def model(self) -> CoupledModel:

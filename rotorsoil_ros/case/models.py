@@ -43,6 +43,7 @@ from rotorsoil_ros.machine.band import (
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.placement import Placement
+from rotorsoil_ros.machine.plant.source import SourceModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 from rotorsoil_ros.machine.spread import Place, SoilSpread
 
@@ -75,8 +76,11 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
     """
     with solved('the ground under this machine'):
         soils = soil_models(case, directory)
-    return CoupledModel(case.rotor, case.foundations, soils, case.couples,
-                        tuple(probe.name for probe in case.ground_probes),
+    points = tuple(probe.name for probe in case.ground_probes)
+    if case.berth is not None:
+        return case.berth.model(case.rotor, case.foundations, soils, couples=case.couples,
+                                points=points)
+    return CoupledModel(case.rotor, case.foundations, soils, case.couples, points,
                         Placement(is_upright=case.rotor.is_upright))
 
 
@@ -116,7 +120,14 @@ def response_key(case: Case, model: CoupledModel) -> str:
     """Return what identifies the response table of a case: all of it but its unbalance."""
     return content_key('response', 2, TOLERANCE, model.rotor, model.foundations,
                        [_identity(soil) for soil in model.soil_models], case.speed_range,
-                       model.couples, model.points)
+                       model.couples, model.points, *_among(model))
+
+
+def _among(model: CoupledModel) -> list[object]:
+    """Return what identifies the neighbours of a machine, nothing where it has none."""
+    if not isinstance(model, SourceModel):
+        return []
+    return [model.place, list(model.neighbours), model.index]
 
 
 def _identity(model: SoilModel) -> object:
@@ -185,10 +196,12 @@ def response_band(
     coupled through it (boundary elements; of circles infinite elements), instead of cones and
     discs; where that is not known, on ground as much stiffer as it may be.
     None where nothing is uncertain, as with known bearings on a support that knows of no soil.
+    Of a machine among others it holds those that stand, and those at their highest speed.
     """
     spread = spread or case.uncertainty
     with_soil = case.soil is not None and depends_on_soil(model)
-    if not with_soil and not spread.inputs(with_soil=False):
+    otherwise = _otherwise(case, model)
+    if not with_soil and not spread.inputs(with_soil=False) and not otherwise:
         return None
     if (case.soil is not None and case.ground is None
             and case.support.model == BOUNDARY_ELEMENTS):
@@ -207,7 +220,15 @@ def response_band(
                      if case.soil is not None]
         others.append(of_other_form(machine, solved=solved_on, stiffer=stiffer,
                                     takes_solved=on_solved, takes_stiffer=on_stiffer))
-    return ResponseBand.build(table, others, unbalance_factor=spread.unbalance_factor)
+    return ResponseBand.build(table, [*others, *otherwise],
+                              unbalance_factor=spread.unbalance_factor)
+
+
+def _otherwise(case: Case, model: CoupledModel) -> tuple[CoupledModel, ...]:
+    """Return the machine with its neighbours at other speeds, where it has any that turn."""
+    if case.berth is None or not isinstance(model, SourceModel):
+        return ()
+    return case.berth.otherwise(model)
 
 
 def machine_at(

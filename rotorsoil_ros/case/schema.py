@@ -241,18 +241,23 @@ class SensorsEntry(PickupEntry):
     channels: dict[Name, PickupEntry] = Field(default_factory=dict)
 
 
-class Document(Entry):
-    """The whole file."""
+class Common(Entry):
+    """What the files of one machine and of several both say."""
 
     name: Name
     soil: AnySoil | None = None
     support: SupportEntry
     foundations: list[FoundationEntry] = Field(default_factory=list)
     ground: GroundEntry = Field(default_factory=GroundEntry)
-    rotor: RotorEntry
-    unbalances: list[UnbalanceEntry] = Field(default_factory=list)
-    speed_range_rpm: tuple[Rpm, Rpm]
     uncertainty: Uncertainty | None = None
     zones: ZonesEntry | None = None
     sensors: SensorsEntry = Field(default_factory=SensorsEntry)
     anti_alias: bool = False
+
+
+class Document(Common):
+    """The whole file."""
+
+    rotor: RotorEntry
+    unbalances: list[UnbalanceEntry] = Field(default_factory=list)
+    speed_range_rpm: tuple[Rpm, Rpm]

@@ -71,6 +71,8 @@ def derived_quantities(
     """
     low, high = case.speed_range
     yield 'case', f'{case.name} ({case.path})'
+    if case.berth is not None:
+        yield 'among others', case.berth.told
     yield 'speed range', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm'
     if case.rotor.is_upright:
         yield 'orientation', ('vertical: y along the shaft is up, x and z are horizontal, z '

@@ -1,9 +1,11 @@
 """Whether a vibration is good, acceptable or dangerous by the usual limits."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Literal, TypeAlias
 
+from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.schema import ZonesEntry
 from rotorsoil_ros.errors import RotorSoilError
 
 SupportClass: TypeAlias = Literal['rigid', 'flexible']
@@ -165,3 +167,22 @@ def held_support_class(
     classes = {support_class(lowest_natural_speed, speed * (1.0 + turn * hysteresis))
                for turn in (-1, 1)}
     return before if before in classes else support_class(lowest_natural_speed, speed)
+
+
+def zones_of(faults: Faults) -> ZoneLimits:
+    """Return the limits of a group, or those that the file gives itself."""
+    entry = faults.entries.zones or ZonesEntry()
+    own = (entry.label, entry.rigid, entry.flexible, entry.rigid_displacement,
+           entry.flexible_displacement)
+    given = any(part is not None for part in own)
+    if entry.group is not None and given:
+        raise faults.error('zones', problem='needs either group, or label, rigid and flexible, '
+                                            'got both')
+    with faults.at('zones', entry=entry):
+        if not given:
+            return replace(ISO_10816_3[entry.group or USUAL_GROUP], baseline=entry.baseline)
+        label, rigid, flexible, *displacements = own
+        if label is None or rigid is None or flexible is None:
+            raise faults.error('zones', problem='needs label, rigid and flexible together')
+        return ZoneLimits(label, rigid, flexible, displacements[0], displacements[1],
+                          entry.baseline)

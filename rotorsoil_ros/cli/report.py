@@ -17,6 +17,7 @@ from rotorsoil_ros.case.design.rigidity import of_rigidity
 from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.design.tables import key_of
 from rotorsoil_ros.case.journal_entries import BEYOND
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.summary import (
     clipped,
     derived_quantities,
@@ -28,6 +29,7 @@ from rotorsoil_ros.case.summary import (
     warnings,
 )
 from rotorsoil_ros.cli.arguments.options import SI
+from rotorsoil_ros.cli.plant import check_each, neighbour_warnings
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError
@@ -52,8 +54,16 @@ _FELT = 2.5
 
 def check(arguments: Namespace) -> int:
     """Print what follows from a case, where it is critical, and what looks odd."""
-    case = load(arguments.case, arguments.overrides, cache_directory=arguments.cache)
     units = Units(arguments.units != SI)
+    status, together = check_each(
+        arguments, units, lambda overrides: _check(arguments, overrides, units))
+    _print_table(together)
+    return status
+
+
+def _check(arguments: Namespace, overrides: Sequence[str], units: Units) -> int:
+    """Check one machine, alone or among others."""
+    case = load(arguments.case, overrides, cache_directory=arguments.cache)
     directory = cache.directory(arguments.cache)
     with progress('solving') as _:
         model = models.coupled_model(case, directory)
@@ -77,7 +87,8 @@ def check(arguments: Namespace) -> int:
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
                          warnings(case, shapes), of_rigidity(case, model.soil_models),
-                         depth_remarks(case, model, directory)):
+                         depth_remarks(case, model, directory),
+                         neighbour_warnings(Machine(case, directory))):
         print(f'warning: {warning}')
     growing = list(unstable(table.stability))
     for text in growing:

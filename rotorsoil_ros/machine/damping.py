@@ -159,10 +159,12 @@ class DampingSplitter:
         """
         model, support = self.model, self.model.support
         found = model.unbalance_response(speed, unbalance)
-        seats = 4 * len(model.rotor.bearings)
+        # Of a machine among others: they may come before it.
+        first = model.channels.index(model.rotor.channels[0])
+        seats = slice(first, first + 4 * len(model.rotor.bearings))
         pairs = (len(speed), len(model.rotor.bearings), 2, 2)
-        journal, housing = np.moveaxis(found.displacement[:, :seats].reshape(pairs), 2, 0)
-        through = found.force[:, :seats].reshape(pairs)[:, :, 0]
+        journal, housing = np.moveaxis(found.displacement[:, seats].reshape(pairs), 2, 0)
+        through = found.force[:, seats].reshape(pairs)[:, :, 0]
         names = {block.name for block in model.foundations}
         blocks = [index for index, channel in enumerate(model.channels)
                   if channel.station in names]

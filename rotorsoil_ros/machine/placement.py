@@ -38,6 +38,13 @@ class Placement:
             value = getattr(self, own.name)
             require(math.isfinite(value), own.name, f'finite, in {unit}', value)
 
+    def point(self, position: float) -> tuple[float, float]:
+        """Return x and y of a place along the shaft, in the axes of the ground [m]."""
+        if self.is_upright:
+            return self.x, self.y
+        return (self.x - math.sin(self.heading) * position,
+                self.y + math.cos(self.heading) * position)
+
     def seat_rows(
         self, *, position: float, height: float, centre: tuple[float, float],
     ) -> FloatArray:
@@ -63,14 +70,14 @@ class Placement:
 
         """
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        x, y = self.point(position)
         if self.is_upright:
-            x, y, z = self.x - centre[0], self.y - centre[1], height + position
+            x, y, z = x - centre[0], y - centre[1], height + position
             return np.array([
                 [cosine, sine, 0.0, -sine * z, cosine * z, sine * x - cosine * y],
                 [sine, -cosine, 0.0, cosine * z, sine * z, -cosine * x - sine * y],
             ])
-        across = self.x - sine * position - centre[0]
-        along = self.y + cosine * position - centre[1]
+        across, along = x - centre[0], y - centre[1]
         return np.array([
             [cosine, sine, 0.0, -sine * height, cosine * height,
              sine * across - cosine * along],

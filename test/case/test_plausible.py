@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.plant.together import sources_of
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
@@ -15,7 +16,9 @@ FAN = CONFIG / 'plant_fan.yaml'
 
 @pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
 def test_shipped_cases_raise_no_question(path):
-    assert list(slips(load(path))) == []
+    for name in sources_of(path) or [None]:
+        case = load(path, [f'source={name}'] if name else [])
+        assert list(slips(case)) == []
 
 
 @pytest.mark.parametrize('setting, asked', [

@@ -177,6 +177,8 @@ def band_contents(case: Case) -> str:
         case.soil is not None and case.support.model in (*_BY_DISCS, BOUNDARY_ELEMENTS))
     parts = [f'{INPUTS[name].words} ({_extent(getattr(spread, name))})'
              for name in spread.inputs(with_soil=knows_soil) if name not in _SOIL]
+    if case.berth is not None and any(case.berth.fastest):
+        parts.append('neighbours that stand or run their fastest')
     if case.soil is None or not knows_soil:
         return '; '.join(parts)
     parts.insert(0, f'soil (G within a factor {spread.shear_modulus_factor:g}, nu within '

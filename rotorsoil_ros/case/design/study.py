@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.authoring.comments import Guess, guesses
 from rotorsoil_ros.case.config import Case
@@ -18,7 +19,7 @@ from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
 from rotorsoil_ros.case.design.rigidity import of_rigidity
 from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
-from rotorsoil_ros.channel import across, HOUSING
+from rotorsoil_ros.channel import across, Channel, HOUSING
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.damping import DampingSplit
 from rotorsoil_ros.machine.modes.natural import lowest_natural_frequency
@@ -105,6 +106,8 @@ def _housings(
         columns = [machine.model.channels.index(channel) for channel in channels]
         low, high = extremes(case, machine.model, speed)
         sizes[0], sizes[2] = np.fmin(sizes[0], low[columns]), np.fmax(sizes[2], high[columns])
+    for other in machine.others() if exists else ():
+        sizes = _together(sizes, other, tuple(channels), speed)
     support = {axis: support_class(
         lowest_natural_frequency(machine.model, axis=axis, highest=RIGID_MARGIN * speed), speed)
         for axis in {channel.axis for channel in channels}}
@@ -112,6 +115,19 @@ def _housings(
                            case.zones.of(support[channel.axis], speed))
              for channel, size in zip(channels, sizes.T, strict=True)]
     return tuple(sorted(found, key=lambda one: -one.badness))
+
+
+def _together(
+    sizes: FloatArray, other: 'Machine', channels: tuple[Channel, ...], speed: float,
+) -> FloatArray:
+    """Add what another machine does at its own speed: amplitudes (3, c) of the same velocity."""
+    assert other.case.berth is not None
+    rated = other.case.berth.rated_speed
+    bounds = other.bounds(rpm=rad_s_to_rpm(rated))[channels]
+    own = np.concatenate([bounds.low, bounds.nominal, bounds.high])
+    # What is not known of its band is taken as it stands.
+    own = np.where(np.isfinite(own), own, own[1])
+    return np.asarray(np.sqrt(sizes**2 + (rated / speed * own) ** 2))
 
 
 def _assumptions(machine: 'Machine') -> Iterator[str]:
@@ -124,6 +140,9 @@ def _assumptions(machine: 'Machine') -> Iterator[str]:
     for block, shape in zip(case.foundations, shapes, strict=True):
         if told := model_error(case, block, shape):
             yield f'{block.name}: {told}'
+    if case.berth is not None:
+        yield (f'{case.name} {case.berth.told}; velocities are of all together, curves over the '
+               f'speed of {case.name} alone')
     for disc, moment in zip(case.rotor.discs, case.unbalance, strict=False):
         if moment:
             yield f'unbalance of {disc.name}: {1e3 * abs(moment):.3g} kg mm'

@@ -11,6 +11,7 @@ import numpy as np
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.authoring.comments import edited
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.plant.machines import written_out
 from rotorsoil_ros.monitor.identification.case import (
     COUPLE,
     FARTHEST_PULL,
@@ -135,12 +136,18 @@ def write_case(found: Identification, target: Path) -> None:
     content = deepcopy(dict(found.case.content))
     document.override(content, found.settings)
     entries = {entry['disc']: entry for entry in _entries(found)}
-    own = content.get('unbalances') or []
+    # Among several machines a disc carries the name of its own, but not in the file.
+    berth, machines = found.case.berth, content.get('machines') or []
+    holder = content if berth is None else machines[berth.index]
+    before = '' if berth is None else f'{found.case.name}_'
+    own = holder.get('unbalances') or []
     # Each in the place of the first that its disc has; of several the others are gone.
-    kept = [entries.pop(entry['disc'], None) if entry['disc'] in found.columns else entry
-            for entry in own]
-    content['unbalances'] = [entry for entry in kept if entry is not None] + list(
-        entries.values())
+    kept = [entries.pop(f'{before}{entry["disc"]}', None)
+            if f'{before}{entry["disc"]}' in found.columns else entry for entry in own]
+    holder['unbalances'] = [entry | {'disc': entry['disc'].removeprefix(before)} for entry in (
+        *(entry for entry in kept if entry is not None), *entries.values())]
+    for machine in machines:
+        machine['rotor'] = written_out(machine, found.case.files)
     for entry in (content.get('support'), *(content.get('foundations') or [])):
         for key in ('file', 'stiffness_file'):
             if isinstance(entry, dict) and isinstance(entry.get(key), str):
@@ -155,7 +162,7 @@ def _written(path: Path) -> str | None:
     """Return the text of a case file; None where a case came from elsewhere."""
     try:
         text = path.read_text(encoding='utf-8')
-    except OSError:
+    except (OSError, UnicodeDecodeError):  # a log is no text
         return None
     return text
 

@@ -1,0 +1,1 @@
+"""Several machines in one case file, each of them the source of an answer of its own."""
