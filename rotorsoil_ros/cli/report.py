@@ -29,7 +29,7 @@ from rotorsoil_ros.case.summary import (
     warnings,
 )
 from rotorsoil_ros.cli.arguments.options import SI
-from rotorsoil_ros.cli.plant import check_each, neighbour_warnings
+from rotorsoil_ros.cli.plant.check import check_each, neighbour_warnings
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.errors import NotSolvedError

@@ -14,7 +14,7 @@ from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import Plant, sources_of
 from rotorsoil_ros.channel import HOUSING
 from rotorsoil_ros.cli import main
-from rotorsoil_ros.cli.plant import neighbour_warnings
+from rotorsoil_ros.cli.plant.check import neighbour_warnings
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.machine.plant.source import SourceModel
 

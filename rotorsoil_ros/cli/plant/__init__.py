@@ -1,0 +1,1 @@
+"""What verbs say of several machines at once."""
