@@ -31,7 +31,7 @@ OWNERS = {
     **{name: {'node', 'testing'} for name in ROS}, 'pytest': {'testing'},
     'rerun': {'screen'}, 'mcap': {'bags'},
     'matplotlib': {'figures'}, 'pandas': {BASE}, 'xarray': {BASE}, 'pydantic': {'case', 'bags'},
-    'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags'}, 'rosbags': {'bags'},
+    'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags', 'case'}, 'rosbags': {'bags'},
     'pyarrow': {'bags', 'screen'},  # rerun itself needs it
     'asyncua': {'feeds'}, 'cryptography': {'feeds'}, 'google': {'feeds'}, 'paho': {'feeds'},
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},

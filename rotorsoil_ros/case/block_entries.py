@@ -1,10 +1,12 @@
 """Which blocks the entries of a case file describe, and what follows where they say less."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
+from pathlib import Path
 
-from rotorsoil_ros.case import schema
+from rotorsoil_ros.case import cache, schema
 from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.entries.entry import Place
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.accuracy import gap
@@ -16,11 +18,19 @@ from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
 _ROUND_OFF = 1e-9
 
 
+# What stands for a foundation that bends where its files are at fault.
+_STAND_IN = Foundation('stand_in', Rectangle(1e-3, 1e-3), 0.0, 1.0, 0.0, (1.0, 1.0, 1.0))
+
+
 @dataclass(frozen=True)
 class BlockEntries:
     """Builds the foundations and says at which key one was refused."""
 
     faults: Faults
+    files: dict[str, str]
+    speed_range: tuple[float, float] | None
+    cache_directory: Path | None
+    mended: frozenset[Place]
 
     def foundations(self) -> tuple[Foundation, ...] | None:
         """Return the blocks, or None where one is at fault."""
@@ -75,6 +85,14 @@ class BlockEntries:
             self.faults.found.append(self.faults.error('foundations', index, problem=(
                 f'no bearing stands on {entry.name}' + ('; a block beside the machine needs '
                                                         'centre_y in m' if coupled else ''))))
+        if any(place[:3] == ('foundations', index, 'flexible') for place in self.mended):
+            # Nobody can make up files: what else is wrong is looked for.
+            return replace(_STAND_IN, name=entry.name)
+        if entry.flexible is not None:
+            return self._flexible(index, entry)
+        if entry.soil_under is not None:
+            raise self.faults.error('foundations', index, 'soil_under', problem=(
+                'belongs to a foundation that bends, and flexible is missing'))
         with self.faults.at('foundations', index, entry=entry):
             contact = self._contact(index, entry)
             mass, centre, inertia = self._body(index, entry, contact)
@@ -92,6 +110,17 @@ class BlockEntries:
                 centre_y=along + y, centre_of_gravity_height=centre, inertia=inertia,
                 height=entry.height, inertia_product=product,
                 young_modulus=entry.young_modulus)
+
+    def _flexible(self, index: int, entry: schema.FoundationEntry) -> Foundation:
+        # Sparse matrices and their files take a third of a second to import.
+        from rotorsoil_ros.case.flexible.entries import FlexibleEntries
+
+        if self.speed_range is None:
+            raise self.faults.error('foundations', index, 'flexible', problem=(
+                'needs speed_range_rpm, up to which it has to be known'))
+        kept = cache.Cache(cache.directory(self.cache_directory))
+        return FlexibleEntries(self.faults, self.files, self.speed_range[1], kept).foundation(
+            index, entry)
 
     def _body(
         self, index: int, entry: schema.FoundationEntry, contact: Contact,

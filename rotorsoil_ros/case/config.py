@@ -204,10 +204,9 @@ def case_of(
         content: dict[str, Any], mended: frozenset[Place] = frozenset(),
     ) -> tuple[Case | None, list[InputError]]:
         entries, found = validated(schema_of, path, content)
-        solves_films = not any(place[0] in _CARRIED for place in mended)
 
         def build(told: Faults) -> Case | None:
-            return _Builder(told, content, texts, cache_directory, solves_films).case()
+            return _Builder(told, content, texts, cache_directory, mended).case()
 
         if isinstance(entries, PlantDocument):
             return case_among(path, entries, texts, build)
@@ -236,24 +235,24 @@ class _Builder:
     content: Mapping[str, Any]
     files: dict[str, str]
     cache_directory: Path | None
-    solves_films: bool
+    mended: frozenset[Place]
 
     def case(self) -> Case | None:
         """Return the machine, or None where something is wrong with it; that is in the faults."""
-        faults, entries = self.faults, self.faults.entries
-        on = GroundEntries(faults)
+        faults, entries, on = self.faults, self.faults.entries, GroundEntries(self.faults)
         ground = faults.attempt(on.ground)
         names_differ = faults.names_differ()
         faults.attempt(self._refuse_unused_files)
-        faults.attempt(on.refuse_unfit_support)
-        faults.attempt(on.refuse_unfit_spread)
+        for refuse in (on.refuse_unfit_support, on.refuse_unfit_bed, on.refuse_unfit_spread):
+            faults.attempt(refuse)
         speed_range = faults.attempt(self._speed_range)
         # A mesh that nobody could solve is not even built.
         of_rotor = RotorEntries(faults)
         rotor = of_rotor.rotor() if faults.attempt(of_rotor.mesh) else None
         if rotor is not None:
             faults.attempt(lambda: self._refuse_bursting_speed(rotor))
-        foundations, embedments = BlockEntries(faults).foundations(), on.embedments(ground)
+        blocks = BlockEntries(faults, self.files, speed_range, self.cache_directory, self.mended)
+        foundations, embedments = blocks.foundations(), on.embedments(ground)
         probes = faults.attempt(SiteEntries(faults).probes)
         unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
         unbalance = unbalances.total()
@@ -304,7 +303,7 @@ class _Builder:
 
     def _journals(self) -> JournalEntries:
         return JournalEntries(self.faults, cache.directory(self.cache_directory),
-                              self.solves_films)
+                              not any(place[0] in _CARRIED for place in self.mended))
 
     def _refuse_bursting_speed(self, rotor: Rotor) -> None:
         """Raise an InputError at a speed that no shaft of this diameter survives."""

@@ -13,7 +13,8 @@ from rotorsoil_ros.arrays import ComplexArray, Numbers, numbers
 from rotorsoil_ros.case import cache, config, document, models
 from rotorsoil_ros.case.answers.modal import ModalAnswers
 from rotorsoil_ros.case.journal_entries import bearing_states, BearingStates
-from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.channel import across, Channel
+from rotorsoil_ros.errors import InputError, NotSolvedError
 from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -104,6 +105,42 @@ class Machine(ModalAnswers):
         found = Response.of(self.model.channels,
                             self.model.unbalance_response(speed, self.case.unbalance))
         return found.where(self._growth(speed).holds(speed))
+
+    @property
+    def seats(self) -> tuple[Channel, ...]:
+        """What `seat_receptance` is over: x and z of every bearing, in this order."""
+        return tuple(channel for bearing in self.case.rotor.bearings
+                     for channel in across(bearing.name))
+
+    def seat_receptance(self, *, hz: Numbers) -> ComplexArray:
+        """
+        Solve for the motion of what the bearings stand on, without the rotor.
+
+        Foundation, ground and pedestals: what an impact test on the empty foundation shows.
+
+        Parameters
+        ----------
+        hz : float or (n,) floats
+            Frequencies [Hz].
+
+        Returns
+        -------
+        (n, 2 b, 2 b) complex array
+            Displacement per force over `seats`, response first [m/N].
+
+        Raises
+        ------
+        OutOfTableError
+            If a frequency is beyond a table of the ground.
+        NotSolvedError
+            If an undamped resonance is hit.
+
+        """
+        found = self.model.support.standing(hz_to_rad_s(numbers('hz', hz))).receptance
+        if not np.all(np.isfinite(found)):
+            raise NotSolvedError('the foundation has no finite receptance: a resonance without '
+                                 'damping is hit, or nothing holds it')
+        return found
 
     def bearings(self, *, rpm: Numbers) -> tuple[BearingStates, ...]:
         """

@@ -12,28 +12,24 @@ import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.design.below import identity, soil_models
 from rotorsoil_ros.case.design.ground import band_contents
 from rotorsoil_ros.case.design.shapes import other_forms
 from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
-    infinite_element_model,
     key_of,
     layered_site_model,
     thin_layer_model,
 )
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.summary import stability_doubts, unstable
-from rotorsoil_ros.errors import InputError, solved
+from rotorsoil_ros.errors import solved
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
-from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, ThinLayerModel
 from rotorsoil_ros.ground.layers.profile import LayeredSoil, LEAST_LOSS_FACTOR
 from rotorsoil_ros.ground.neighbours import on_soil
-from rotorsoil_ros.ground.soil import RigidSoil, Soil, SoilModel
-from rotorsoil_ros.ground.table import ComplianceTable
+from rotorsoil_ros.ground.soil import Soil, SoilModel
 from rotorsoil_ros.machine.band import (
     depends_on_soil,
     highest_poisson_ratio,
@@ -75,7 +71,7 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
 
     """
     with solved('the ground under this machine'):
-        soils = soil_models(case, directory)
+        soils = soil_models(case, Cache(directory))
     points = tuple(probe.name for probe in case.ground_probes)
     if case.berth is not None:
         return case.berth.model(case.rotor, case.foundations, soils, couples=case.couples,
@@ -84,42 +80,12 @@ def coupled_model(case: Case, directory: Path) -> CoupledModel:
                         Placement(is_upright=case.rotor.is_upright))
 
 
-def soil_models(case: Case, directory: Path) -> tuple[SoilModel, ...]:
-    """Return the model under each foundation, or one under all of them, as `coupled_model`."""
-    if case.support.model == BOUNDARY_ELEMENTS and case.soil is not None:
-        site = site_of(case.foundations, case.ground_probes)
-        if case.ground is not None:
-            return (layered_site_model(case.ground, site, cache=Cache(directory),
-                                       speed_range=case.speed_range),)
-        return (boundary_element_model(case.soil, site, cache=Cache(directory),
-                                       speed_range=case.speed_range),)
-    return tuple(_soil_model(case, index, Cache(directory))
-                 for index in range(len(case.foundations)))
-
-
-def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
-    if case.support.model == 'rigid':
-        return RigidSoil()
-    if case.support.model == 'table':
-        return case.tables[index]
-    if case.soil is None:
-        raise InputError(f'{case.path}: soil: is missing')
-    contact = case.foundations[index].contact
-    if case.support.model == 'cone':
-        embedment = case.embedments[index]
-        return (EmbeddedConeModel(case.soil, contact, embedment) if embedment.depth else
-                ConeModel(case.soil, contact))
-    if case.ground is not None:
-        return thin_layer_model(case.ground, contact, case.embedments[index], cache=cache,
-                                speed_range=case.speed_range)
-    return infinite_element_model(case.soil, contact, case.support.geometry, cache=cache,
-                                  speed_range=case.speed_range)
 
 
 def response_key(case: Case, model: CoupledModel) -> str:
     """Return what identifies the response table of a case: all of it but its unbalance."""
     return content_key('response', 2, TOLERANCE, model.rotor, model.foundations,
-                       [_identity(soil) for soil in model.soil_models], case.speed_range,
+                       [identity(soil) for soil in model.soil_models], case.speed_range,
                        model.couples, model.points, *_among(model))
 
 
@@ -128,21 +94,6 @@ def _among(model: CoupledModel) -> list[object]:
     if not isinstance(model, SourceModel):
         return []
     return [model.place, list(model.neighbours), model.index]
-
-
-def _identity(model: SoilModel) -> object:
-    if isinstance(model, InfiniteElementModel):
-        return ['infinite', model.soil, model.contact, key_of(model)]
-    if isinstance(model, ThinLayerModel):
-        return ['layers', LAYERS_ALGORITHM, model.ground, model.contact, model.embedment,
-                float(model.table.edges[-1])]
-    if isinstance(model, BoundaryElementModel):
-        return ['boundary', model.soil, model.site, key_of(model)]
-    if isinstance(model, LayeredSiteModel):
-        return ['site on layers', model.ground, model.site, key_of(model)]
-    if isinstance(model, ComplianceTable):
-        return ['table', model.omega, model.values, *model.cut_offs]
-    return model
 
 
 def stored_response_table(
@@ -203,13 +154,13 @@ def response_band(
     otherwise = _otherwise(case, model)
     if not with_soil and not spread.inputs(with_soil=False) and not otherwise:
         return None
-    if (case.soil is not None and case.ground is None
+    if (case.soil is not None and case.ground is None and not model.support.bends
             and case.support.model == BOUNDARY_ELEMENTS):
         model = replace(model, soil_models=(boundary_element_model(
             case.soil, site_of(case.foundations, case.ground_probes), cache=Cache(directory),
             speed_range=case.speed_range, spread=spread.poisson_ratio),))
     elements, stiffer = other_forms(
-        case, soil_models(case, directory), spread, directory)
+        case, soil_models(case, Cache(directory)), spread, directory)
     forms = _forms(spread.places(with_soil=with_soil), with_elements=bool(elements),
                    with_stiffer=any(stiffer))
     others = []

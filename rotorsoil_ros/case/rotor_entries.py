@@ -164,7 +164,7 @@ class RotorEntries:
             pedestal = self._pedestal((*place, 'pedestal'), entry.pedestal)
         with self.faults.at(*place, entry=entry):
             return Bearing(name=entry.name, position=entry.position, foundation=foundation,
-                           pedestal=pedestal, **matrices)
+                           pedestal=pedestal, seat=entry.seat, **matrices)
 
     def _coefficients(self, place: Place, entry: BearingEntry) -> dict[str, Any]:
         given = {key: value for key in ('stiffness', 'damping', 'inertia')

@@ -5,7 +5,16 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import Discriminator, Field, StrictBool, StringConstraints, Tag
 
 from rotorsoil_ros.case.entries.bearing import BearingEntry
-from rotorsoil_ros.case.entries.entry import Entry, EVEN, given_or_named, KEYS, LAYERED, WORD
+from rotorsoil_ros.case.entries.entry import (
+    Entry,
+    EVEN,
+    given_or_named,
+    KEYS,
+    LAYERED,
+    NUMBER,
+    TABLE,
+    WORD,
+)
 from rotorsoil_ros.case.entries.shaft import AnyMaterial, Loaded, Section
 from rotorsoil_ros.case.quantities import (
     BalanceGrade,
@@ -80,12 +89,34 @@ class SupportEntry(Entry):
     cut_offs_hz: list[Hertz] | None = None
 
 
+def _one_or_list(value: object) -> str:
+    return TABLE if isinstance(value, (list, tuple)) else NUMBER
+
+
 class PartEntry(Entry):
     """Rectangle of a plan, its centre across and along the shaft."""
 
     half_width: Metre
     half_length: Metre
     centre: tuple[Metre, Metre]
+
+
+class FlexibleEntry(Entry):
+    """Files of a foundation that bends: matrices and what they are of, or modes."""
+
+    stiffness: FileName | None = None
+    mass: FileName | None = None
+    dofs: FileName | None = None
+    modes: FileName | None = None
+    residual: FileName | None = None
+    rigid: FileName | None = None
+    loss_factor: Ratio | None = None
+    damping_ratios: Annotated[
+        Annotated[Ratio, Tag(NUMBER)] | Annotated[list[Ratio], Tag(TABLE)],
+        Discriminator(_one_or_list)] | None = None
+    keep_up_to: Ratio = 3.0
+    grounded: StrictBool = False
+    rigid_contact: StrictBool = False
 
 
 class FoundationEntry(Entry):
@@ -108,6 +139,8 @@ class FoundationEntry(Entry):
     embedment: Metre = 0.0
     side_contact: Ratio | None = None
     stiffness_file: FileName | None = None
+    flexible: FlexibleEntry | None = None
+    soil_under: Literal['winkler', 'green', 'each'] | None = None
 
 
 class DiscEntry(Entry):
@@ -198,6 +231,7 @@ class Uncertainty(Entry):
     rotor_mass_factor: Ratio | None = None
     shaft_stiffness_factor: Ratio | None = None
     shaft_height_factor: Ratio | None = None
+    foundation_stiffness_factor: Ratio | None = None
     unbalance_factor: Ratio | None = None
     model_form: StrictBool | None = None
     rock_depth: tuple[Metre, MetreOrEndless] | None = None

@@ -18,11 +18,13 @@ from rotorsoil_ros.case.design.ground import (
     of_site,
 )
 from rotorsoil_ros.case.design.rigidity import bending_told
+from rotorsoil_ros.case.flexible.words import bodies_told, of_bodies
 from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.accuracy import ShapeError
+from rotorsoil_ros.ground.bed import as_one
 from rotorsoil_ros.ground.soil import (
     below_each,
     equivalent_radii,
@@ -88,13 +90,14 @@ def derived_quantities(
         yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
         yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
     yield from layers_told(case)
-    below = below_each(soil_models, len(case.foundations))
+    below = map(as_one, below_each(soil_models, len(case.foundations)))
     for foundation, model, shape in itertools.zip_longest(case.foundations, below, shapes):
         yield from _of_foundation(case, foundation, model)
         told = model_error(case, foundation, shape)
         if told:
             yield f'{foundation.name}: model error', told
     yield from bending_told(case, soil_models)
+    yield from bodies_told(case)
     yield from of_site(case, soil_models)
     for journal in case.journals:
         yield from _of_journal(case, journal)
@@ -190,6 +193,7 @@ def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[s
         yield from _of_film(case, journal)
     yield from of_neighbours(case)
     yield from of_shapes(case, shapes)
+    yield from of_bodies(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):

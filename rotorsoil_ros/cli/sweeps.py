@@ -63,6 +63,24 @@ def compliance(arguments: Namespace) -> int:
     return 0
 
 
+def seats(arguments: Namespace) -> int:
+    """Write the receptance of what the bearings stand on, without the rotor."""
+    machine = machine_of(arguments)
+    names = machine.seats
+    plant = units_of(arguments) == PLANT
+
+    def rows(omega: FloatArray) -> FloatArray:
+        found = machine.seat_receptance(hz=rad_s_to_hz(omega))
+        key = rad_s_to_hz(omega) if plant else omega
+        return np.concatenate([key[:, None], complex_columns(
+            found.reshape(len(omega), len(names) ** 2))], axis=1)
+
+    header = ['frequency_hz' if plant else 'omega_rad_s', *complex_names(
+        f'{response}__{force}' for response in names for force in names)]
+    write_sweep(arguments.output, header, hz_to_rad_s(values(arguments.hz)), rows)
+    return 0
+
+
 def _contact(
     machine: Machine, name: str | None,
 ) -> tuple[Foundation, Callable[[FloatArray], ComplexArray], list[str]]:

@@ -6,10 +6,12 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.ground.bed import PatchedGround
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
+from rotorsoil_ros.ground.green import GreenModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, Soil, SoilModel, static_scale
@@ -65,7 +67,11 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
 
     """
     match model:
-        case BoundaryElementModel():
+        case PatchedGround():
+            found = model.mapped(lambda one: on_soil(one, soil, getattr(one, 'contact', contact)))
+            assert found is not None
+            return found
+        case BoundaryElementModel() | GreenModel():
             return model.on(soil)
         case ConeModel() | EmbeddedConeModel():
             return replace(model, soil=soil, contact=contact)
@@ -89,6 +95,8 @@ def without_loss(model: SoilModel, contact: Contact) -> SoilModel | None:
     """Return a model on the same soil without material damping; None where it knows of none."""
     if isinstance(model, RigidSoil):
         return model
+    if isinstance(model, PatchedGround):
+        return model.mapped(lambda one: without_loss(one, getattr(one, 'contact', contact)))
     if isinstance(model, (BoundaryElementModel, ConeModel, EmbeddedConeModel,
                           InfiniteElementModel)):
         return on_soil(model, replace(model.soil, loss_factor=0.0), contact)

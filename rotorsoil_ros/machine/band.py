@@ -10,11 +10,13 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.accuracy import StifferGround
+from rotorsoil_ros.ground.bed import below_patches
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.elements.table import LARGEST_POISSON_RATIO
 from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
+from rotorsoil_ros.ground.green import GreenModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
 from rotorsoil_ros.ground.neighbours import on_soil
@@ -240,9 +242,9 @@ def _response(predictor: Predictor, speed: FloatArray) -> ComplexArray:
 
 def depends_on_soil(model: CoupledModel) -> bool:
     """Return whether a machine stands on a soil that its model knows."""
-    return any(isinstance(soil, (BoundaryElementModel, ConeModel, EmbeddedConeModel,
+    return any(isinstance(soil, (BoundaryElementModel, ConeModel, EmbeddedConeModel, GreenModel,
                                  InfiniteElementModel, LayeredSiteModel, ThinLayerModel))
-               for soil in model.soil_models)
+               for own in model.soil_models for soil in below_patches(own))
 
 
 def on_soils(model: CoupledModel, soils: Sequence[Soil]) -> list[CoupledModel]:
@@ -282,5 +284,6 @@ def of_other_form(
 
 def highest_poisson_ratio(model: CoupledModel) -> float:
     """Return up to which Poisson's ratio the supports of a machine hold."""
-    solved = any(isinstance(soil, InfiniteElementModel) for soil in model.soil_models)
+    solved = any(isinstance(soil, InfiniteElementModel)
+                 for own in model.soil_models for soil in below_patches(own))
     return LARGEST_POISSON_RATIO if solved else 0.49

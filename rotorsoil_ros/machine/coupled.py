@@ -92,16 +92,16 @@ class CoupledModel:
     def channels(self) -> tuple[Channel, ...]:
         """All motions, in the order of the last axis of a Prediction."""
         found = [channel for rotor in self.rotors for channel in rotor.channels]
-        found += [Channel(foundation.name, '', dof)
-                  for foundation in self.foundations for dof in DOFS]
+        found += self.support.places
         found += [Channel(point, '', axis) for point in self.points for axis in DOFS[:3]]
         return tuple(found)
 
     @cached_property
     def transmits_force(self) -> BoolArray:
-        """Which channels transmit a force, (c,) bool: bearings and foundations."""
+        """Which channels transmit a force, (c,) bool: bearings and what stands on the ground."""
         found = [channel.part != '' for rotor in self.rotors for channel in rotor.channels]
-        return np.array(found + [True] * (6 * len(self.foundations)) + [False] * self._on_ground)
+        found += [True] * self.support.transmitting
+        return np.array(found + [False] * (len(self.channels) - len(found)))
 
     @property
     def _on_ground(self) -> int:
@@ -347,7 +347,7 @@ class CoupledModel:
     def _on_rotor(self, loads: ComplexArray) -> ComplexArray:
         """Extend loads on the ports by none on housings and blocks."""
         housings = sum(2 * len(rotor.bearings) for rotor in self.rotors)
-        below = housings + 6 * len(self.foundations)
+        below = housings + len(self.support.places)
         return np.concatenate([loads, np.zeros((below, loads.shape[1]))])
 
     def _respond(

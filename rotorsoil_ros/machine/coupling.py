@@ -6,7 +6,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import NotSolvedError
-from rotorsoil_ros.machine.support import Standing
+from rotorsoil_ros.machine.standing import Standing
 from rotorsoil_ros.rotor.whirl import PortReceptance
 
 
@@ -21,12 +21,12 @@ class Answer:
         Motion of the ports of every rotor [m].
     housings : (n, 2 b, k) complex array
         Motion of the bearing housings [m].
-    blocks : (n, 6 f, k) complex array
-        Motion of the blocks [m, rad].
+    blocks : (n, l, k) complex array
+        Motion of the foundations' places [m, rad].
     through : (n, 2 b, k) complex array
         Force through the bearings [N].
-    into_soil : (n, 6 f, k) complex array
-        Force of the blocks on the soil [N, N m].
+    into_soil : (n, g, k) complex array
+        Force on the ground of the places that stand on it [N, N m].
     ground : (n, 3 p, k) complex array
         Motion of points on the ground [m].
 
@@ -53,9 +53,9 @@ def answer(
         As `driven`.
     standing : Standing
         What the bearings stand on, at the same frequencies.
-    loads : (2 p + 2 b + 6 f, k) complex array
+    loads : (2 p + 2 b + l, k) complex array
         Columns of forces over (x, z) of the ports, over (x, z) of the housings and over the
-        axes of the blocks [N, N m], the same at every frequency.
+        places of the foundations [N, N m], the same at every frequency.
     ground : (3, k) float array
         Motion of the ground in the same columns [m].
 

@@ -9,19 +9,21 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
 from rotorsoil_ros.ground.neighbours import without_loss
+from rotorsoil_ros.machine.continued import continued as continued_of
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import CriticalSpeed
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.whirl import ORBITS
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
-BEARINGS, PEDESTALS, RADIATION, MATERIAL, SOIL = (
-    'bearings', 'pedestals', 'radiation', 'soil material', 'soil')
+BEARINGS, PEDESTALS, STRUCTURE, RADIATION, MATERIAL, SOIL = (
+    'bearings', 'pedestals', 'foundation material', 'radiation', 'soil material', 'soil')
 # By the shaft: its material, what stands around it, and the torque, which may give.
 INTERNAL, EXTERNAL, TORQUE = 'shaft material', 'around the rotor', 'torque'
 _OF_SHAFT = (INTERNAL, EXTERNAL, TORQUE)
-DAMPERS = (BEARINGS, PEDESTALS, *_OF_SHAFT, RADIATION, MATERIAL, SOIL)
+DAMPERS = (BEARINGS, PEDESTALS, STRUCTURE, *_OF_SHAFT, RADIATION, MATERIAL, SOIL)
 
 # Above, a mode hardly swings before it is gone, and shares of its decay mean nothing.
 LARGEST_DAMPING_RATIO = 0.7
@@ -127,6 +129,10 @@ class DampingSplitter:
             return None
         return replace(support, soil_models=tuple(twin for twin in twins if twin is not None))
 
+    @property
+    def _bending(self) -> list[Foundation]:
+        return [block for block in self.model.foundations if block.body is not None]
+
     @cached_property
     def parts(self) -> tuple[tuple[str, str], ...]:
         """What may take energy, in the order of its columns."""
@@ -135,6 +141,7 @@ class DampingSplitter:
         return (*((BEARINGS, bearing.name) for bearing in bearings),
                 *((PEDESTALS, bearing.name) for bearing in bearings
                   if bearing.pedestal is not None),
+                *((STRUCTURE, block.name) for block in self._bending),
                 *((kind, block.name) for kind in soil for block in self.model.foundations),
                 *((_OF_SHAFT[index], 'rotor') for index in self._losing))
 
@@ -165,19 +172,19 @@ class DampingSplitter:
         pairs = (len(speed), len(model.rotor.bearings), 2, 2)
         journal, housing = np.moveaxis(found.displacement[:, seats].reshape(pairs), 2, 0)
         through = found.force[:, seats].reshape(pairs)[:, :, 0]
-        names = {block.name for block in model.foundations}
-        blocks = [index for index, channel in enumerate(model.channels)
-                  if channel.station in names]
-        motion, into_soil = found.displacement[:, blocks], found.force[:, blocks]
-        flat = (len(speed), 2 * len(model.rotor.bearings))
-        seat = motion @ support.block_rows.T
-        deflection = (housing.reshape(flat) - seat)[:, support.pedestal_axes]
-        inertia = speed[:, None] ** 2 * (housing.reshape(flat) @ support.housing_mass)
-        below = (through.reshape(flat) + inertia)[:, support.pedestal_axes]
+        contacts = [model.channels.index(channel)
+                    for part in support.members for channel in part.contacts]
+        motion, into_soil = found.displacement[:, contacts], found.force[:, contacts]
+        flat = housing.reshape(len(speed), 2 * len(model.rotor.bearings))
+        below = through.reshape(flat.shape) + speed[:, None] ** 2 * (flat @ support.housing_mass)
+        deflection = np.einsum('nij,nj->ni', support.pedestals(speed), below)
+        own, arriving = support.pedestal_axes, ((flat - deflection).conj() * below).imag
+        structure = [arriving[:, list(part.seats)].sum(axis=1) - taken for part, taken in zip(
+            support.members, self._by_foundation(motion, into_soil).T, strict=True)]
         radiated = None if self._lossless is None else _pushed(
             self._lossless.ground(speed), motion)
-        taken = self._taken(journal - housing, through, deflection, below, motion, into_soil,
-                            radiated)
+        taken = self._taken(journal - housing, through, deflection[:, own], below[:, own], motion,
+                            into_soil, radiated, structure)
         lost = self._lost(speed, self._whirls(speed, unbalance, journal, through))
         return DampingSplit(speed, self.parts, math.pi * np.concatenate([taken, lost], axis=1))
 
@@ -236,8 +243,8 @@ class DampingSplitter:
             return [None] * len(criticals)
         highest = 1.2 * max(one.speed for one in swinging)
         span = self.model.support.known(highest)
-        continued = None if self._lossless is None else self._lossless.continued(span)
-        blocks = 6 * len(self.model.foundations)
+        continued = None if self._lossless is None else continued_of(self._lossless, span)
+        blocks = self.model.support.contacts
         found: list[DampingSplit | None] = []
         for one in criticals:
             if abs(one.damping_ratio) > LARGEST_DAMPING_RATIO:
@@ -258,38 +265,51 @@ class DampingSplitter:
         self, critical: CriticalSpeed, w: complex, lossless: ComplexArray | None,
     ) -> DampingSplit:
         model, support = self.model, self.model.support
-        speed, blocks = np.array([critical.speed]), 6 * len(model.foundations)
+        speed, blocks = np.array([critical.speed]), support.contacts
         nodes = [model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
         pairs = (1, len(nodes), 2)
         gap = critical.deflection[nodes].ravel() - support.motion_rows @ critical.support
         stiffness, damping, inertia = (part[0] for part in model.bearings.coefficients(
             speed, speed))
         through = (stiffness + 1j * w * damping - w**2 * inertia) @ gap
-        below = (support.motion_rows.T @ through
+        pressed = support.motion_spring @ critical.support
+        below = (support.motion_rows.T @ through - pressed
                  + w**2 * (support.motion_mass @ critical.support))[None]
+        bent = (critical.support.conj() * pressed).imag
+        axes = slice(blocks, blocks + len(support.pedestal_axes))
         motion = critical.support[None, :blocks]
         radiated = None if lossless is None else _pushed(lossless, motion)
         taken = self._taken(
-            gap.reshape(pairs), through.reshape(pairs), critical.support[None, blocks:],
-            below[:, blocks:], motion, below[:, :blocks], radiated)
-        bent = np.stack([critical.deflection, critical.slope], axis=1).reshape(-1, 2)
-        lost = self._lost(speed, (bent @ ORBITS.conj().T).T[:, None], np.array([w]))
+            gap.reshape(pairs), through.reshape(pairs), critical.support[None, axes],
+            below[:, axes], motion, below[:, :blocks], radiated,
+            [bent[own].sum(keepdims=True) for own in support.motions])
+        whirl = np.stack([critical.deflection, critical.slope], axis=1).reshape(-1, 2)
+        lost = self._lost(speed, (whirl @ ORBITS.conj().T).T[:, None], np.array([w]))
         return DampingSplit(speed, self.parts, np.concatenate([taken, lost], axis=1))
 
     def _taken(
         self, gap: ComplexArray, through: ComplexArray, deflection: ComplexArray,
         below: ComplexArray, motion: ComplexArray, into_soil: ComplexArray,
-        radiated: ComplexArray | None,
+        radiated: ComplexArray | None, structure: Sequence[FloatArray],
     ) -> FloatArray:
-        """Return Im(u^H F) of every part, (n, k)."""
+        """Return Im(u^H F) of every part, (n, k); structure is that of each foundation."""
         rows = len(gap)
         films = (gap.conj() * through).imag.sum(axis=2)
         springs = (deflection.conj() * below).imag.reshape(rows, -1, 2).sum(axis=2)
-        soil = (motion.conj() * into_soil).imag.reshape(rows, -1, 6).sum(axis=2)
+        bends = [taken[:, None] for taken, block in zip(
+            structure, self.model.foundations, strict=True) if block.body is not None]
+        soil = self._by_foundation(motion, into_soil)
         if radiated is None:
-            return np.concatenate([films, springs, soil], axis=1)
-        waves = (motion.conj() * radiated).imag.reshape(rows, -1, 6).sum(axis=2)
-        return np.concatenate([films, springs, waves, soil - waves], axis=1)
+            return np.concatenate([films, springs, *bends, soil], axis=1)
+        waves = self._by_foundation(motion, radiated)
+        return np.concatenate([films, springs, *bends, waves, soil - waves], axis=1)
+
+    def _by_foundation(self, motion: ComplexArray, force: ComplexArray) -> FloatArray:
+        """Return Im(u^H F) of the contacts of each foundation, (n, f)."""
+        ends = np.cumsum([len(part.contacts) for part in self.model.support.members], dtype=int)
+        parts = np.split((motion.conj() * force).imag, ends[:-1], axis=1) if len(ends) else []
+        return np.stack([part.sum(axis=1) for part in parts], axis=1) if parts else (
+            np.zeros((len(motion), 0)))
 
 
 def _is_passive(split: DampingSplit) -> bool:

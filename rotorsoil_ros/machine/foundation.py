@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, require
 from rotorsoil_ros.ground.soil import Contact
+from rotorsoil_ros.machine.flexible.body import FlexibleBody
 from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 
 # Young's modulus of what most blocks are made of [Pa].
@@ -52,6 +53,8 @@ class Foundation:
         Integral of x y dm about the centre of gravity [kg m^2]: of an L, not of a rectangle.
     young_modulus : float
         Of what it is made of [Pa]; whether it is rigid depends on it, and nothing else.
+    body : FlexibleBody or None
+        What it is where it bends: then mass and inertia above are for people only.
 
     """
 
@@ -65,6 +68,7 @@ class Foundation:
     centre_x: float = 0.0
     inertia_product: float = 0.0
     young_modulus: float = CONCRETE
+    body: FlexibleBody | None = None
 
     def __post_init__(self) -> None:
         require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)

@@ -124,7 +124,7 @@ def _half_power_factor(
     forward = 0.5 * (critical.deflection[:, 1] + 1j * critical.deflection[:, 0])
     excites = np.zeros(len(model.planes), dtype=complex)
     excites[:len(rows)] = forward[rows]
-    blocks = {block.name for block in model.foundations}
+    blocks = {place.station for place in model.support.places}
     shaft = [index for index, channel in enumerate(model.channels)
              if channel.axis in ACROSS and channel.part != HOUSING
              and channel.station not in blocks]

@@ -67,6 +67,8 @@ class SoilSpread:
         Of the bending stiffness of the shaft, its mass kept.
     shaft_height_factor : float
         Of the height of the shaft above the contact.
+    foundation_stiffness_factor : float
+        Of the modulus of foundations that bend.
     unbalance_factor : float
         Of the unbalance, all planes alike.
     rock_depth : tuple of two floats or None
@@ -96,6 +98,7 @@ class SoilSpread:
     rotor_mass_factor: float = 1.0
     shaft_stiffness_factor: float = 1.0
     shaft_height_factor: float = 1.0
+    foundation_stiffness_factor: float = 1.0
     unbalance_factor: float = 1.0
     rock_depth: tuple[float, float] | None = None
     side_contact: tuple[float, float] | None = None
@@ -220,6 +223,9 @@ class SoilSpread:
         rotor, blocks = model.rotor, tuple(model.foundations)
         if (mass := scale('foundation_mass_factor')) != 1.0:
             blocks = tuple(_heavier(block, mass) for block in blocks)
+        if (modulus := scale('foundation_stiffness_factor')) != 1.0:
+            blocks = tuple(block if block.body is None else replace(
+                block, body=block.body.stiffer(modulus)) for block in blocks)
         bearings = tuple(_other_bearing(
             bearing, stiffness=scale('bearing_stiffness_factor'),
             damping=scale('bearing_damping_factor'), pedestal=scale('pedestal_stiffness_factor'))
@@ -234,7 +240,8 @@ class SoilSpread:
 def _heavier(block: Foundation, factor: float) -> Foundation:
     x, y, z = block.inertia
     return replace(block, mass=factor * block.mass,
-                   inertia=(factor * x, factor * y, factor * z))
+                   inertia=(factor * x, factor * y, factor * z),
+                   body=None if block.body is None else block.body.heavier(factor))
 
 
 def _other_bearing(

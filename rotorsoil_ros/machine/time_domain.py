@@ -85,6 +85,8 @@ def shake(
             np.any(values(bearing.inertia)) for bearing in model.rotor.bearings):
         raise RotorSoilError('integration in time knows no damping of and no torque in the shaft, '
                              'no inertia of bearings and no tables over frequency')
+    if model.support.bends:
+        raise RotorSoilError('integration in time knows no foundation that bends')
     system = _System(model, speed)
     step = float(time[1] - time[0])
     rate = np.gradient(speed, time)

@@ -75,6 +75,8 @@ class Bearing:
         Over (x, z), cross terms included [N/m], [N s/m], [kg]; an inertia over the speed at most.
     pedestal : Pedestal or None
         What carries the housing; None is rigid.
+    seat : str or None
+        Name of the place on a foundation that bends; None is that of the bearing.
 
     """
 
@@ -85,6 +87,7 @@ class Bearing:
     damping: Coefficients
     pedestal: Pedestal | None = None
     inertia: FloatArray | SpeedTable = field(default_factory=lambda: np.zeros((2, 2)))
+    seat: str | None = None
 
     def __post_init__(self) -> None:
         for (name, unit), matrix in zip(_UNITS.items(), self.matrices, strict=True):

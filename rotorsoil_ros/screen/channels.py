@@ -52,7 +52,8 @@ def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]
     owners |= {foundation.name: BLOCK for foundation in case.foundations}
     shown: list[Trend] = []
     for channel in channels:
-        kind = _kind(channel, owners[channel.station])
+        # Patches and probes of a foundation that bends have names of their own.
+        kind = _kind(channel, owners.get(channel.station, BLOCK))
         colour = CHANNEL_COLOURS[sum(trend.kind == kind for trend in shown) % len(CHANNEL_COLOURS)]
         entity = rr.new_entity_path([machine, channel.station, channel.motion])
         shown.append(Trend(channel, kind, entity, colour))

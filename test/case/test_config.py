@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.case.models import coupled_model, soil_models
+from rotorsoil_ros.case.design.below import soil_models
+from rotorsoil_ros.case.models import coupled_model
 from rotorsoil_ros.case.summary import warnings
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.cone import ConeModel
@@ -38,7 +40,7 @@ def test_each_foundation_has_the_soil_of_its_own_contact():
         f'foundations=[{{name: block, half_width: 0.5, half_length: 0.2, mass: 42, '
         f'centre_of_gravity_height: 0.1, inertia: [1, 2, 3]}}, {second}]'])
     assert case.soil is not None
-    assert soil_models(case, NO_CACHE) == (ConeModel(case.soil, Rectangle(0.5, 0.2)),
+    assert soil_models(case, Cache(NO_CACHE)) == (ConeModel(case.soil, Rectangle(0.5, 0.2)),
                                            ConeModel(case.soil, Circle(0.3)))
 
 
@@ -58,12 +60,12 @@ def test_rigid_support_needs_neither_soil_nor_foundations():
         'support.model=rigid', 'soil=', 'foundations=[]',
         'rotor.bearings.0.foundation=', 'rotor.bearings.1.foundation='])
     assert case.soil is None
-    assert soil_models(case, NO_CACHE) == ()
+    assert soil_models(case, Cache(NO_CACHE)) == ()
     assert case.rotor.bearings[0].foundation is None
 
 
 def test_rigid_support_takes_a_case_with_blocks_as_it_is():
-    assert soil_models(load(PAPER, ['support.model=rigid']), NO_CACHE) == (RigidSoil(),)
+    assert soil_models(load(PAPER, ['support.model=rigid']), Cache(NO_CACHE)) == (RigidSoil(),)
 
 
 def test_section_may_be_conical_of_its_own_material_and_carry_mass():

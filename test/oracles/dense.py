@@ -283,6 +283,6 @@ class _System:
         forces.append(np.full((len(load), others), complex(np.nan, np.nan)))
         for index, foundation in enumerate(model.foundations):
             own = blocks[:, 6 * index:6 * index + 6]
-            forces.append(seats @ model.support.seat_rows[index]
+            forces.append(seats @ model.support.block_rows[:, 6 * index:6 * index + 6]
                           + self.omega[:, None] ** 2 * (own @ foundation.mass_matrix))
         return ((self.channels @ motion)[..., 0], np.concatenate(forces, axis=1))

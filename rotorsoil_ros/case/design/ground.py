@@ -8,6 +8,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import INPUTS
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
+from rotorsoil_ros.case.flexible.words import bed_error
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.ground.accuracy import CONE_ERROR, gap, neglected_coupling, ShapeError
 from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
@@ -63,6 +64,8 @@ def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) ->
 
     """
     support, contact = case.support.model, foundation.contact
+    if bed := bed_error(foundation):
+        return bed
     if support == BOUNDARY_ELEMENTS:
         alone = len(case.foundations) == 1 and not isinstance(contact, Plan)
         where = '' if case.ground is None else ' on these layers'
@@ -191,6 +194,8 @@ def band_contents(case: Case) -> str:
 
 def _other_forms_of(case: Case) -> str:
     """Return which ground the band holds beside that of the case."""
+    if any(block.body is not None for block in case.foundations):
+        return 'not the error of the ground below patches'
     if case.support.model not in ('cone', 'infinite_elements') or case.soil is None:
         return ''
     if any(embedment.depth for embedment in case.embedments):

@@ -151,6 +151,8 @@ def larger_block(model: CoupledModel, factor: float) -> CoupledModel | None:
 
     None where its ground would have to be solved anew.
     """
+    if model.support.bends:
+        return None
     blocks = tuple(_larger(block, factor) for block in model.foundations)
     if not blocks or not all(isinstance(soil, _REBUILT)
                              for soil in model.soil_models):

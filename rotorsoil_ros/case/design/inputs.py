@@ -59,6 +59,9 @@ INPUTS = {
     'foundation_mass_factor': UncertainInput(
         'mass of the foundation', 'lightest foundation', 'heaviest foundation',
         'take the mass of what stands on the block from its drawings'),
+    'foundation_stiffness_factor': UncertainInput(
+        'stiffness of the foundation', 'softest foundation', 'stiffest foundation',
+        'strike the foundation with an instrumented hammer and hold it against `seats`'),
     'rotor_mass_factor': UncertainInput(
         'mass of the rotor', 'lightest rotor', 'heaviest rotor',
         'take mass and inertia of the rotor from its drawing, or weigh it'),

@@ -25,6 +25,8 @@ def rigidities(
     """Yield how rigid each block is that could bend, and its place among the foundations."""
     below = below_each(soil_models, len(case.foundations))
     for index, (block, ground) in enumerate(zip(case.foundations, below, strict=True)):
+        if block.body is not None:
+            continue
         found = rigidity(block, ground, case.speed_range)
         if found is not None:
             yield index, block, found

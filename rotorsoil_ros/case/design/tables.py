@@ -4,7 +4,7 @@ from functools import lru_cache
 
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.entries.ground import infinite_range, proportions
-from rotorsoil_ros.case.entries.site import layered_site, site_reach
+from rotorsoil_ros.case.entries.site import HIGHEST_ORDER, layered_site, site_reach
 from rotorsoil_ros.ground.boundary.effort import HIGHEST_POISSON_RATIO
 from rotorsoil_ros.ground.boundary.layered_model import (
     LAYERED_SITE_ALGORITHM,
@@ -16,6 +16,7 @@ from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BOUNDARY_ALGORITHM, BoundaryTable
 from rotorsoil_ros.ground.elements.table import DimensionlessTable
+from rotorsoil_ros.ground.green import GREEN_ALGORITHM, GreenModel, GreenTable, pairs_of
 from rotorsoil_ros.ground.half_space import a0_range, ELEMENTS_ALGORITHM, InfiniteElementModel
 from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, Proportions, ThinLayerModel
 from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
@@ -168,6 +169,35 @@ def _boundary_table(
     table = tabulated(site, poisson_ratio=poisson_ratio, loss_factor=loss_factor, a0_max=a0_max)
     cache.store('compliance', key, table.to_arrays())
     return table
+
+
+def green_model(
+    soil: Soil, places: tuple[tuple[float, float], ...], radii: tuple[float, ...], *,
+    cache: Cache, speed_range: tuple[float, float],
+) -> GreenModel:
+    """
+    Return patches coupled through a half-space, solved unless such a grid was before.
+
+    Parameters
+    ----------
+    soil, places, radii
+        As `GreenModel.solved`.
+    cache : Cache
+        Where dimensionless tables lie.
+    speed_range : tuple of two floats
+        Rotor speeds to be covered [rad/s].
+
+    """
+    highest = HIGHEST_ORDER * speed_range[1]
+    pairs, _ = pairs_of(places, radii)
+    key = content_key('green', GREEN_ALGORITHM, pairs, soil.poisson_ratio, soil.loss_factor,
+                      highest * radii[0] / soil.shear_wave_speed)
+    stored = cache.load('compliance', key)
+    if stored is not None:
+        return GreenModel(soil, places, radii, GreenTable.from_arrays(stored))
+    model = GreenModel.solved(soil, places, radii, omega_max=highest)
+    cache.store('compliance', key, model.table.to_arrays())
+    return model
 
 
 def site_key(site: Site, poisson_ratio: float, loss_factor: float, a0_max: float) -> str:

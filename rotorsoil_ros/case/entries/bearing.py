@@ -176,6 +176,7 @@ class BearingEntry(Entry):
     name: Name
     position: Metre
     foundation: Name | None = None
+    seat: Name | None = None
     stiffness: Annotated[
         Annotated[Stiffness, Tag(CONSTANT)] | Annotated[StiffnessTable, Tag(TABLE)]
         | Annotated[StiffnessMap, Tag(MAP)], Discriminator(_over_what)] | None = None

@@ -156,6 +156,31 @@ class GroundEntries:
             raise self.faults.error('foundations', problem='is missing; the support model '
                                                            f'{support.model} needs a block')
 
+    def refuse_unfit_bed(self) -> None:
+        """Raise an InputError where the ground cannot stand below what bends."""
+        entries, model = self.faults.entries, self.faults.entries.support.model
+        for index, block in enumerate(entries.foundations):
+            if block.flexible is None:
+                continue
+            if block.soil_under == 'green' and (
+                    model in ('rigid', 'table', THIN_LAYERS)
+                    or isinstance(entries.soil, schema.LayersEntry)):
+                raise self.faults.error('foundations', index, 'soil_under', problem=(
+                    'must be winkler or each where the ground is no homogeneous half-space, got '
+                    f'green with the support model {model}'))
+            if model == BOUNDARY_ELEMENTS and len(entries.foundations) > 1:
+                raise self.faults.error('support', 'model', problem=(
+                    f'must be one that takes each foundation alone where {block.name} bends '
+                    f'(foundations.{index}), got {model}, which couples rigid blocks'))
+            if entries.ground.probes:
+                raise self.faults.error('ground', 'probes', problem=(
+                    f'tell the motion beside rigid blocks only, and {block.name} bends '
+                    f'(foundations.{index})'))
+            if entries.support.geometry != 'disc':
+                raise self.faults.error('support', 'geometry', problem=(
+                    f'must be disc below what bends (foundations.{index}), got '
+                    f'{entries.support.geometry}'))
+
     def refuse_unfit_spread(self) -> None:
         """Raise an InputError where a block would stand in the rock that may be there."""
         entries = self.faults.entries

@@ -86,6 +86,11 @@ def _add_case_verbs(verbs: Verbs) -> None:
     sweep.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, help='frequency [Hz]')
     compliance.add_argument('--foundation', metavar='NAME', help='which block, if several')
     add_table_output(compliance)
+    seats = add_verb(verbs, 'seats', 'sweeps:seats',
+                     'write how what the bearings stand on moves by forces there, as CSV')
+    seats.add_argument('--hz', metavar='A:B:N', type=Sweep.parse, required=True,
+                       help='frequency [Hz]')
+    add_table_output(seats)
     response = add_verb(verbs, 'response', 'sweeps:response',
                      'write the unbalance response of every channel as CSV')
     sweep = response.add_mutually_exclusive_group(required=True)

@@ -50,6 +50,8 @@ class FreeVibration:
         Housing motion per motion of the support.
     mass : (s, s) float array
         Of the support.
+    spring : (s, s) complex array
+        Its stiffness beside the compliance: of foundations that bend.
     compliance : Continuation
         Of the support without its mass.
     highest : float
@@ -67,6 +69,7 @@ class FreeVibration:
     bearings: tuple[ComplexArray, ComplexArray, ComplexArray]
     rows: FloatArray
     mass: FloatArray
+    spring: ComplexArray
     compliance: Continuation
     highest: float
     reach: float
@@ -161,13 +164,13 @@ class FreeVibration:
         modal, motion = range(ports, ports + modes), slice(ports + modes, None)
         total = np.zeros((*frequency.shape, gap.shape[-1], gap.shape[-1]), dtype=complex)
         # Bearings g = (Z - 1) gap; modes (1 - w / w_k) p = -S (g - Y z), S driven; support
-        # z = N (Y^T (g + gap) + w^2 M z), where the compliance N may be zero.
+        # z = N (Y^T (g + gap) + (w^2 M - K) z), where the compliance N may be zero.
         total[..., force, :] = np.eye(ports, gap.shape[-1]) - extra @ gap
         total[..., mode, force] = driven[:, None]
         total[..., modal, modal] = 1.0 - frequency[..., None] * inverse[:, None]
         total[..., mode, motion] = -total[..., mode, force] @ self.rows
         total[..., motion, :] = -(compliance @ self.rows.T) @ through
-        total[..., motion, motion] += np.eye(own) - w**2 * (compliance @ self.mass)
+        total[..., motion, motion] += np.eye(own) + compliance @ (self.spring - w**2 * self.mass)
         return total
 
     def pencil(self) -> tuple[ComplexArray, ComplexArray]:
@@ -203,7 +206,7 @@ class FreeVibration:
         a[:, motion, motion], a[:, motion, load] = np.eye(own), -soil_states.constant
         a[:, motion, soil] = -soil_states.left
         a[:, load, force] = a[:, load, gap] = -self.rows.T
-        a[:, load, load] = np.eye(own)
+        a[:, load, load], a[:, load, motion] = np.eye(own), self.spring
         b[:, load, motion] = self.rows.T @ first @ self.rows
         b[:, load, rate] = middle * (self.mass + self.rows.T @ second @ self.rows)
         a[:, soil, load], a[:, soil, soil] = soil_states.right, np.diag(soil_states.poles)

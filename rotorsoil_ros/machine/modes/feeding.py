@@ -176,7 +176,7 @@ def feeds(pencil: Pencil, vibrations: Vibrations, index: int) -> tuple[Feed, ...
     rotor, support, load = (pencil.part(vibrations, index, name)
                             for name in ('rotor', 'support', 'load'))
     gap = pencil.journals @ rotor - pencil.rows @ support
-    model, blocks = pencil.model, 6 * len(pencil.model.foundations)
+    model, blocks = pencil.model, pencil.model.support.contacts
     terms: list[tuple[str, tuple[str, ...], FloatArray]] = [
         (bearing.name, _OF_BEARING, _taken(w, gap[pair], bearing, vibrations.speed) / spring)
         for bearing, spring, pair in zip(model.rotor.bearings, model.nominal_springs.tolist(),

@@ -75,7 +75,8 @@ class ModeNames:
             Of the mode and of the rotor [rad/s].
 
         """
-        energies = self._in_soil(support, frequency) | self._in_pedestals(support)
+        energies = (self._in_soil(support, frequency) | self._in_pedestals(support)
+                    | self._in_foundations(support))
         energies['shaft'] = float(np.vdot(deflection, self._bending @ deflection).real)
         energies['bearings'] = self._in_bearings(deflection, support, speed, frequency)
         # All springs of one block together, so that coupled sliding and rocking are one body.
@@ -105,17 +106,35 @@ class ModeNames:
     def _in_soil(self, support: ComplexArray, frequency: float) -> dict[str, float]:
         """Return the energy that the soil stores by each motion of each block."""
         found = {}
-        for index, (block, soil) in enumerate(zip(
-                self.model.foundations, self.model.support.soils, strict=True)):
-            own = np.abs(support[6 * index:6 * index + 6]) ** 2
-            gives = np.abs(np.diagonal(soil.compliance(np.array([frequency]))[0]))
-            for dof, square, compliance in zip(DOFS, own.tolist(), gives.tolist(), strict=True):
-                if compliance > 0.0:
-                    found[f'{block.name} {_MOTIONS[dof]}'] = square / compliance
+        ends = np.cumsum([0, *(len(part.contacts) for part in self.model.support.members)])
+        gives = np.abs(np.diagonal(self.model.support.ground(np.array([frequency]))[0]))
+        for block, part, first in zip(
+                self.model.foundations, self.model.support.members, ends.tolist(), strict=False):
+            own = slice(first, first + len(part.contacts))
+            # Of patches: what their mean motion would store, and the rest is bending.
+            stores = np.divide(1.0, gives[own], out=np.zeros(len(part.contacts)),
+                               where=gives[own] > 0.0)
+            mean = part.mean @ support[own]
+            rigid = np.abs(part.rows[part.places[1]] * mean) ** 2
+            for dof, energy in zip(DOFS, (stores @ rigid).tolist(), strict=True):
+                if energy > 0.0:
+                    found[f'{block.name} {_MOTIONS[dof]}'] = energy
+        return found
+
+    def _in_foundations(self, support: ComplexArray) -> dict[str, float]:
+        """Return the energy that each foundation stores by bending."""
+        found, below = {}, self.model.support
+        for block, own in zip(self.model.foundations, below.motions, strict=True):
+            if block.body is not None:
+                part = support[own]
+                spring = below.motion_spring[np.ix_(own, own)].real
+                elastic = part[own >= below.contacts]
+                found[f'{block.name} bending'] = float(
+                    np.vdot(part, spring @ part).real + np.vdot(elastic, elastic).real)
         return found
 
     def _in_pedestals(self, support: ComplexArray) -> dict[str, float]:
-        found, place = {}, 6 * len(self.model.foundations)
+        found, place = {}, self.model.support.contacts
         for bearing in self.model.rotor.bearings:
             if bearing.pedestal is not None:
                 pair = support[place:place + 2]

@@ -8,6 +8,7 @@ import scipy.linalg
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.ground.continuation import Continuation
+from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.assembly import Rotor
@@ -95,7 +96,7 @@ def natural_frequencies(
     if not len(support.motion_mass):
         return np.zeros(0), np.zeros((0, len(carried)), dtype=complex)
     span = support.known(highest)
-    pieces = support.continued_by_pieces(span)
+    pieces = continued_by_pieces(support, span)
     found = [_vibrations(support, piece, carried, span, piece.span if len(pieces) > 1 else span)
              for piece in pieces]
     frequency, motion = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -111,15 +112,16 @@ def _vibrations(
     size, unit, soil = compliance.size, 0.5 * span[1], compliance.states(_NOISE)
     rows = support.motion_rows * size
     mass = size[:, None] * support.motion_mass * size + rows.T @ carried @ rows
+    spring = size[:, None] * support.motion_spring * size
     own, states = len(mass), len(soil.poles)
-    # z = constant p + left xi, w xi = poles xi + right p, p = w^2 M z with w z = unit u.
+    # z = constant p + left xi, w xi = poles xi + right p, p = (w^2 M - K) z with w z = unit u.
     a = np.zeros((2 * own + states,) * 2, dtype=complex)
     b = np.zeros_like(a)
     motion, rate, state = slice(0, own), slice(own, 2 * own), slice(2 * own, None)
-    a[motion, motion], a[motion, state] = np.eye(own), -soil.left
+    a[motion, motion], a[motion, state] = np.eye(own) + soil.constant @ spring, -soil.left
     b[motion, rate] = unit * soil.constant @ mass
     a[rate, rate], b[rate, motion] = unit * np.eye(own), np.eye(own)
-    a[state, state] = np.diag(soil.poles)
+    a[state, motion], a[state, state] = -soil.right @ spring, np.diag(soil.poles)
     b[state, rate], b[state, state] = -unit * soil.right @ mass, np.eye(states)
     frequency, vectors = scipy.linalg.eig(a, b)
     finite = np.isfinite(frequency)

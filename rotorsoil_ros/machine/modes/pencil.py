@@ -57,8 +57,9 @@ class Pencil:
     Linear eigenproblem A(speed) y = w B y, in coordinates that do not turn with the speed.
 
     The unknowns are the rotor's coordinates in forward and backward whirl and their rates, the
-    motion z of the support and its rate, the forces p on the massless support, and the states of
-    its compliance, z = N(w) p. Bearing springs are in units of their nominal ones.
+    motion z of the support and its rate, the forces p on its massless compliance, and the states
+    of that, z = N(w) p; beside it what bends has a stiffness K, so that p = f + (w^2 M - K) z.
+    Bearing springs are in units of their nominal ones.
 
     Attributes
     ----------
@@ -135,6 +136,12 @@ class Pencil:
         return np.asarray(size[:, None] * self.model.support.motion_mass * size)
 
     @cached_property
+    def _spring(self) -> ComplexArray:
+        """Stiffness of the support beside its compliance, (s, s)."""
+        size = self.compliance.size
+        return np.asarray(size[:, None] * self.model.support.motion_spring * size)
+
+    @cached_property
     def places(self) -> dict[str, slice]:
         """Where in a vector the unknowns lie."""
         rotor, own = self.journals.shape[1], len(self.mass)
@@ -178,6 +185,7 @@ class Pencil:
             a[at['rotor'], at['rotor_rate']] += scipy.linalg.block_diag(*rates)
         a[at['rotor_rate'], at['rotor_rate']] = self.unit * np.eye(self.journals.shape[1])
         a[at['load'], at['load']] = np.eye(len(self.mass))
+        a[at['load'], at['support']] = self._spring
         a[at['support_rate'], at['support_rate']] = self.unit * np.eye(len(self.mass))
         # The rows of the motion stand behind those of its rate: z - N p = 0.
         a[at['support'], at['support']] = np.eye(len(self.mass))

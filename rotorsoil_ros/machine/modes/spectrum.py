@@ -10,6 +10,7 @@ import scipy.linalg
 from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
 from rotorsoil_ros.ground.continuation import Continuation
+from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of
@@ -136,7 +137,7 @@ class SpectrumSolver:
                 f'tables of bearings must hold some frequency of vibration up to '
                 f'{rad_s_to_hz(high):.4g} Hz, got {rad_s_to_hz(first):g} to '
                 f'{rad_s_to_hz(last):g} Hz')
-        return cls(model, basis, model.support.continued_by_pieces(span), span, following)
+        return cls(model, basis, continued_by_pieces(model.support, span), span, following)
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
@@ -317,7 +318,8 @@ class SpectrumSolver:
         return FreeVibration(
             inverse, journals @ right, journals @ left.swapaxes(2, 3), (constant, rate, inertia),
             unit[:, None] * support.motion_rows * size,
-            size[:, None] * support.motion_mass * size, zone.compliance, self.span[1], reach,
+            size[:, None] * support.motion_mass * size,
+            size[:, None] * support.motion_spring * size, zone.compliance, self.span[1], reach,
             zone.ends(zone.told, speed))
 
 

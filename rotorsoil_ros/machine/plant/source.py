@@ -11,6 +11,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.coupling import Answer, driven, gathered
+from rotorsoil_ros.machine.flexible.part import Mount
 from rotorsoil_ros.machine.modes.natural import riding_mass
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.neighbour import Neighbour
@@ -35,15 +36,10 @@ class JointSupport(Support):
 
     parts: Sequence[Support] = ()
 
-    @cached_property
-    def seat_rows(self) -> FloatArray:
-        """Seat motion per unit block motion, as that of each machine."""
-        return np.concatenate([part.seat_rows for part in self.parts], axis=1)
-
-    @cached_property
-    def firm_rows(self) -> FloatArray:
-        """Motion of seats on no block per unit motion of the ground, as that of each machine."""
-        return np.concatenate([part.firm_rows for part in self.parts])
+    @property
+    def mounts(self) -> list[Mount]:
+        """Where every bearing of every machine is."""
+        return [mount for part in self.parts for mount in part.mounts]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Files that describe foundations that bend, and what is asked of them."""

@@ -1,0 +1,325 @@
+"""Which foundation that bends the entries of a case file describe, and what is refused of it."""
+
+from dataclasses import dataclass, replace
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.case import schema, stiffness_file
+from rotorsoil_ros.case.cache import Cache, content_key
+from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.flexible import matrices, tables
+from rotorsoil_ros.case.flexible.ground import EACH
+from rotorsoil_ros.case.flexible.interface import Interface
+from rotorsoil_ros.channel import ACROSS, DOFS
+from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
+from rotorsoil_ros.machine.flexible.body import CONTACT, FlexibleBody, PROBE
+from rotorsoil_ros.machine.flexible.reduction import FiniteElements
+from rotorsoil_ros.machine.flexible.rigidity import ABOVE_EXCITATION
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz
+
+# Modes have to reach so many times the highest 1X frequency.
+LEAST_REACH, GOOD_REACH = 2.0, 3.0
+
+# A seat belongs onto the shaft [m].
+_OFF_SHAFT = 0.02
+
+_MATRICES, _MODES = ('stiffness', 'mass', 'dofs'), ('modes', 'residual', 'rigid')
+# What a body that bends brings along itself.
+_OWN = ('mass', 'density', 'centre_of_gravity_height', 'inertia', 'parts', 'embedment',
+        'side_contact')
+
+
+@dataclass(frozen=True)
+class FlexibleEntries:
+    """
+    Builds foundations that bend and says at which key one was refused.
+
+    Attributes
+    ----------
+    faults : Faults
+        Of the case.
+    files : dict of str to str
+        Bodies that came with the document, and those that are built here for it.
+    speed : float
+        Highest of the rotor [rad/s].
+    cache : Cache
+        Where bodies lie that were reduced before.
+
+    """
+
+    faults: Faults
+    files: dict[str, str]
+    speed: float
+    cache: Cache
+
+    def foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
+        """Return one foundation, or raise an InputError."""
+        flexible = entry.flexible
+        assert flexible is not None
+        given = next((key for key in _OWN if getattr(entry, key)), None)
+        if given is not None:
+            raise self.faults.error('foundations', index, given, problem=(
+                'belongs to a rigid block; flexible brings its own'))
+        body = self._body(index, entry.name, flexible)
+        with self.faults.at('foundations', index, 'flexible', entry=flexible):
+            body = self._on_ground(index, entry, body)
+            self._refuse_few_modes(index, flexible, body)
+        x, y = self._centre(index, entry, body)
+        mass = body.mass_about_centre
+        height = float(mass[0, 4] / mass[0, 0])
+        moments = mass.diagonal()[3:] - mass[0, 0] * np.array([height**2, height**2, 0.0])
+        about_x, about_y, about_z = np.maximum(moments, 0.0).tolist()
+        return Foundation(
+            name=entry.name, contact=_outline(entry, body), centre_x=x, centre_y=y,
+            mass=float(mass[0, 0]), centre_of_gravity_height=height,
+            inertia=(about_x, about_y, about_z), height=entry.height, body=body)
+
+    def _body(self, index: int, name: str, entry: schema.FlexibleEntry) -> FlexibleBody:
+        """Return the body: as it came with the document, out of the cache, or from its files."""
+        by_modes = self._by_modes(index, entry)
+        highest = entry.keep_up_to * self.speed
+        asked = [highest, entry.model_dump()]
+        told = f'flexible {name}'
+        if told in self.files:
+            stored = json.loads(self.files[told])
+            if stored['asked'] == json.loads(json.dumps(asked)):
+                return FlexibleBody.from_plain(stored['body'])
+        paths = [self._path(getattr(entry, key)) for key in (_MODES if by_modes else _MATRICES)
+                 + ('dofs',) * by_modes if getattr(entry, key) is not None]
+        key = content_key('flexible', asked, [_digest(path) for path in paths])
+        kept = self.cache.load('flexible', key)
+        if kept is not None:
+            plain: dict[str, Any] = json.loads(str(kept['body']))
+            body = FlexibleBody.from_plain(plain)
+        else:
+            with self.faults.at('foundations', index, 'flexible', entry=entry):
+                body = (self._of_modes(index, entry) if by_modes
+                        else self._of_matrices(index, entry, highest))
+            self.cache.store('flexible', key, {'body': np.array(json.dumps(body.to_plain()))})
+        self.files[told] = json.dumps({'asked': asked, 'body': body.to_plain()})
+        return body
+
+    def _by_modes(self, index: int, entry: schema.FlexibleEntry) -> bool:
+        """Return whether modes are given, all that belongs to them included, or matrices."""
+        place = ('foundations', index, 'flexible')
+        both = [key for key in ('stiffness', 'modes') if getattr(entry, key) is not None]
+        if len(both) != 1:
+            raise self.faults.error(*place, problem=(
+                'needs either stiffness, mass and dofs, or modes, residual and rigid, got '
+                f'{"both" if both else "neither"}'))
+        needed = _MODES if both == ['modes'] else _MATRICES
+        for key in needed:
+            if getattr(entry, key) is None:
+                raise self.faults.error(*place, key, problem='is missing' + (
+                    '; without the residual flexibility 60 modes of a raft are still off by '
+                    '38 %, with it 10 are by 0.8 %: let the program write it (RESVEC), or the '
+                    'static flexibility at the interface less that of the modes'
+                    if key == 'residual' else f'; {both[0]} needs it'))
+        if (entry.loss_factor is None) is (entry.damping_ratios is None):
+            raise self.faults.error(*place, problem=(
+                'needs either loss_factor or damping_ratios, got '
+                f'{"neither" if entry.loss_factor is None else "both"}'))
+        if not LEAST_REACH <= entry.keep_up_to < math.inf:
+            raise self.faults.error(*place, 'keep_up_to', problem=(
+                f'must be >= {LEAST_REACH:g} times the highest 1X frequency, '
+                f'got {entry.keep_up_to:g}'))
+        return both == ['modes']
+
+    def _path(self, file: str) -> Path:
+        return self.faults.path.parent / file
+
+    def _loss(self, entry: schema.FlexibleEntry, count: int) -> tuple[FloatArray, float]:
+        """Return the loss factor of each mode, and of the rest."""
+        given = entry.damping_ratios
+        if given is None:
+            assert entry.loss_factor is not None
+            loss: FloatArray = np.full(count, entry.loss_factor)
+        else:
+            ratios = np.array(given, dtype=float)
+            if ratios.ndim and len(ratios) != count:
+                raise RotorSoilError(f'damping_ratios must be one number or {count}, one for each '
+                                     f'mode, got {len(ratios)}')
+            loss = 2.0 * np.broadcast_to(ratios, count)
+        if not (np.all(loss >= 0.0) and np.all(loss < 1.0)):
+            raise RotorSoilError(f'loss_factor must be in [0, 1), got {loss.max():g}')
+        return loss.copy(), float(loss.mean()) if count else 0.0
+
+    def _of_modes(self, index: int, entry: schema.FlexibleEntry) -> FlexibleBody:
+        assert entry.modes is not None
+        assert entry.residual is not None
+        assert entry.rigid is not None
+        at = self._path(entry.modes)
+        if at.suffix.lower() in ('.unv', '.uff'):
+            from rotorsoil_ros.case.flexible.universal import modes as universal
+
+            names, frequency, shapes = universal(at)
+        else:
+            matrices.refuse_foreign(at)
+            names, frequency, shapes = tables.modes(at, stiffness_file.text_of(at))
+        rigid = self._numbers(entry.rigid, 6)
+        if len(rigid) != 6 + len(names):
+            raise InputError(f'{self._path(entry.rigid)}: must have six rows of mass and '
+                             f'{len(names)} of rigid motion, those of {at.name}, got {len(rigid)}')
+        residual = self._numbers(entry.residual, len(names))
+        if len(residual) != len(names):
+            raise InputError(f'{self._path(entry.residual)}: must have {len(names)} rows, those '
+                             f'of {at.name}, got {len(residual)}')
+        dofs = tables.dofs_of(at, names, rigid[6:])
+        if entry.dofs is not None:
+            where = self._path(entry.dofs)
+            known = {f'{row.dof.station}_{row.dof.axis}': row.dof
+                     for row in tables.motions(where, stiffness_file.text_of(where))}
+            missing = next((name for name in names if name not in known), None)
+            if missing is not None:
+                raise InputError(f'{where}: has no {missing}, which {at.name} has')
+            dofs = [known[name] for name in names]
+        loss, rest = self._loss(entry, len(frequency))
+        return FlexibleBody(
+            tuple(dofs), 0.5 * (rigid[:6] + rigid[:6].T), rigid[6:], shapes,
+            hz_to_rad_s(frequency) ** 2, 0.5 * (residual + residual.T), loss, rest)
+
+    def _numbers(self, file: str, columns: int) -> FloatArray:
+        path = self._path(file)
+        matrices.refuse_foreign(path)
+        return tables.numbers_of(path, stiffness_file.text_of(path), columns=columns)
+
+    def _of_matrices(
+        self, index: int, entry: schema.FlexibleEntry, highest: float,
+    ) -> FlexibleBody:
+        assert entry.stiffness is not None
+        assert entry.mass is not None
+        assert entry.dofs is not None
+        paths = [self._path(file) for file in (entry.stiffness, entry.mass, entry.dofs)]
+        stiffness, mass = (matrices.read(path) for path in paths[:2])
+        order = None
+        if paths[0].suffix.lower() == matrices.STIFFNESS:
+            order = matrices.order_of_calculix(paths[0].with_suffix(matrices.ORDER))
+        rows = tables.motions(paths[2], stiffness_file.text_of(paths[2]))
+        wanted = Interface.of(paths[2], rows, stiffness.shape[0], order)
+        elements = FiniteElements.of(stiffness, mass, wanted.dofs, wanted.pick, wanted.known)
+        loss, rest = self._loss(entry, 1)
+        if entry.grounded:
+            return elements.grounded(highest, loss=rest)
+        return elements.body(highest, loss=float(loss[0]))
+
+    def _on_ground(
+        self, index: int, entry: schema.FoundationEntry, body: FlexibleBody,
+    ) -> FlexibleBody:
+        """Return the body with how the ground stands below it, fit for that."""
+        model, under = self.faults.entries.support.model, entry.soil_under
+        assert entry.flexible is not None
+        place = ('foundations', index)
+        if not len(body.contacts):
+            raise self.faults.error(*place, 'flexible', 'dofs', problem=(
+                'must have motions of kind contact, where the ground is'))
+        if entry.flexible.grounded:
+            return body
+        rank = np.linalg.matrix_rank(body.about_centre[body.contacts])
+        if rank < len(DOFS):
+            raise self.faults.error(*place, 'flexible', 'dofs', problem=(
+                'must have contacts that hold all six rigid motions, '
+                f'got {rank}' + ('; one contact needs x, y, z, rx, ry, rz'
+                                 if body.has_one_contact else '')))
+        if body.has_one_contact:
+            self._refuse_soft_contact(index, entry.flexible, body)
+            if under is not None:
+                raise self.faults.error(*place, 'soil_under', problem=(
+                    f'belongs to several contacts, got {under} and one'))
+            return body
+        if under is None and model != 'rigid':
+            raise self.faults.error(*place, 'soil_under', problem=(
+                f'is missing: winkler, green or each, below {len(body.patches)} contacts'))
+        return self._patched(body, under or EACH)
+
+    def _patched(self, body: FlexibleBody, under: str) -> FlexibleBody:
+        """Return a body on several contacts, with those motions that the ground resists."""
+        # Springs shared out by area, and even tractions, turn no patch.
+        dofs = tuple(
+            replace(dof, kind=PROBE) if under != EACH and dof.kind == CONTACT
+            and dof.axis not in DOFS[:3] else dof for dof in body.dofs)
+        return replace(body, dofs=dofs, bed=under)
+
+    def _refuse_soft_contact(
+        self, index: int, entry: schema.FlexibleEntry, body: FlexibleBody,
+    ) -> None:
+        lowest = math.sqrt(float(body.stiffness.min(initial=math.inf)))
+        if (lowest < ABOVE_EXCITATION * self.speed and not entry.rigid_contact
+                and self.faults.entries.support.model != 'rigid'):
+            raise self.faults.error('foundations', index, 'flexible', problem=(
+                f'stands on one contact and bends at {rad_s_to_hz(lowest):.4g} Hz, below '
+                f'{ABOVE_EXCITATION:g} times the highest 1X frequency of '
+                f'{rad_s_to_hz(self.speed):.4g} Hz: one mean contact under a raft is off by up '
+                'to a factor of 12; divide it into patches, with soil_under, or say '
+                'rigid_contact: true where its base does not bend, as below a frame'))
+
+    def _refuse_few_modes(
+        self, index: int, entry: schema.FlexibleEntry, body: FlexibleBody,
+    ) -> None:
+        if entry.modes is not None and body.highest < LEAST_REACH * self.speed:
+            raise self.faults.error('foundations', index, 'flexible', 'modes', problem=(
+                f'must reach {LEAST_REACH:g} times the highest 1X frequency, '
+                f'{rad_s_to_hz(LEAST_REACH * self.speed):.4g} Hz, '
+                f'got {rad_s_to_hz(body.highest):.4g} Hz'))
+
+    def _centre(
+        self, index: int, entry: schema.FoundationEntry, body: FlexibleBody,
+    ) -> tuple[float, float]:
+        """Return where the contact is beside the shaft, after all seats were found on it."""
+        entries = self.faults.entries
+        own = {entry.name, None} if len(entries.foundations) == 1 else {entry.name}
+        bearings = [(number, bearing) for number, bearing in enumerate(entries.rotor.bearings)
+                    if bearing.foundation in own]
+        # Of each seat from the bearing, with the contact in its own frame.
+        gaps, height = [], entries.rotor.shaft_height
+        upright = entries.rotor.orientation == 'vertical'
+        across = ('x', 'y') if upright else ACROSS
+        for number, bearing in bearings:
+            with self.faults.at('rotor', 'bearings', number, entry=bearing):
+                seat = [body.seat(bearing.seat or bearing.name, axis) for axis in across][-1]
+            there = np.array(body.dofs[seat].place) - body.centre
+            here = [0.0, 0.0, height + bearing.position] if upright else [
+                0.0, bearing.position, height]
+            gaps.append(np.array(here) - there)
+        mean = np.nanmean(np.array(gaps or [np.zeros(3)]), axis=0)
+        x = entry.centre_x if 'centre_x' in entry.model_fields_set else float(mean[0])
+        y = float(mean[1]) if entry.centre_y is None else entry.centre_y
+        for (number, bearing), gap in zip(bearings, gaps, strict=True):
+            off = np.where(np.isfinite(gap), gap - np.array([x, y, 0.0]), 0.0)
+            if np.linalg.norm(off) > _OFF_SHAFT:
+                raise self.faults.error('rotor', 'bearings', number, 'seat', problem=(
+                    f'{bearing.seat or bearing.name} must be on the shaft within '
+                    f'{_OFF_SHAFT:g} m, got {off[0]:.4g} m across, {off[1]:.4g} m along and '
+                    f'{off[2]:.4g} m up from the seat to the bearing {bearing.name}'))
+        return x, y
+
+
+def _digest(path: Path) -> str:
+    """Return what identifies what a file says; nothing of one that cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ''
+
+
+def _outline(entry: schema.FoundationEntry, body: FlexibleBody) -> Contact:
+    """Return the contact as a whole: given, or the rectangle of the same second moments."""
+    if entry.radius is not None:
+        return Circle(entry.radius)
+    if entry.half_width is not None and entry.half_length is not None:
+        return Rectangle(entry.half_width, entry.half_length)
+    area = np.array([patch.area for patch in body.patches])
+    places = np.array([patch.place[:2] for patch in body.patches]) - body.centre[:2]
+    # Patches without an area are points: pictures show where they are, no ground asks for more.
+    own = np.where(area > 0.0, area, 1.0)
+    squares = own @ (places**2 + (area / 12.0)[:, None]) / own.sum()
+    width, length = np.sqrt(3.0 * squares).tolist()
+    least = 1e-3 + 0.05 * max(width, length)
+    return Rectangle(max(width, least), max(length, least))

@@ -1,0 +1,80 @@
+"""What can be said of foundations that bend, before anything runs."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.machine.flexible.body import FlexibleBody, GROUNDED
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.units import rad_s_to_hz
+
+# Modes up to so many times the highest 1X frequency leave less than a percent.
+_GOOD_REACH = 3.0
+# Modes that are told, the lowest of all.
+_TOLD = 5
+
+# How far each way to put ground below patches was off, in displacement of the seats: worst and
+# median of several rafts and soils, against the half-space below 48 patches.
+_BEDS = {
+    'winkler': 'springs of the whole contact shared out by area: seats of rafts were off by up to '
+               '30%, 4 to 21% in the median; rocking is softer than that of the whole',
+    'green': 'patches coupled through the half-space: seats of rafts were off by up to 15%, 6 to '
+             '11% in the median; a rigid body on them finds 2 to 6% less stiffness',
+    'each': 'each contact alone on the ground: right of footings that stand 2 to 3 widths apart; '
+            'of patches side by side off by 60 to 90%',
+}
+
+
+def bodies_told(case: Case) -> Iterator[tuple[str, str]]:
+    """Yield what every foundation that bends is."""
+    for block in case.foundations:
+        if block.body is not None:
+            yield from _told(block, block.body)
+
+
+def _told(block: Foundation, body: FlexibleBody) -> Iterator[tuple[str, str]]:
+    name = block.name
+    if body.bed != GROUNDED:
+        x, y, z = _centre_of_gravity(body)
+        yield f'{name}: mass and centre of gravity', (
+            f'{block.mass:.7g} kg at x {x:.4g}, y {y:.4g}, z {z:.4g} m of its own axes')
+    hertz = np.sort(rad_s_to_hz(np.sqrt(body.stiffness)))
+    yield f'{name}: bends', (
+        ', '.join(f'{one:.4g}' for one in hertz[:_TOLD].tolist())
+        + (', ...' if len(hertz) > _TOLD else '') + ' Hz where '
+        + ('its base is held' if body.bed == GROUNDED else 'nothing holds it')
+        + f'; {len(hertz)} modes up to {hertz.max(initial=0.0):.4g} Hz and what they leave out, '
+        + f'loss factor {body.residual_loss:g}')
+    if body.bed != GROUNDED:
+        how = {'winkler': 'a Winkler bed', 'green': 'one half-space',
+               'each': 'ground of their own'}.get(body.bed, 'the ground')
+        yield f'{name}: stands on', (
+            f'{len(body.patches)} contact{"s" if len(body.patches) > 1 else ""}, '
+            f'{len(body.contacts)} motions, on {how}')
+
+
+def _centre_of_gravity(body: FlexibleBody) -> tuple[float, float, float]:
+    mass = body.mass
+    return (float(mass[1, 5] / mass[0, 0]), float(-mass[0, 5] / mass[0, 0]),
+            float(mass[0, 4] / mass[0, 0]))
+
+
+def bed_error(block: Foundation) -> str:
+    """Return how far the ground below the patches of a foundation is off; empty of one contact."""
+    return '' if block.body is None else _BEDS.get(block.body.bed, '')
+
+
+def of_bodies(case: Case) -> Iterator[str]:
+    """Yield which foundations that bend are known by too few modes, and what is left out."""
+    for index, block in enumerate(case.foundations):
+        entry = case.content['foundations'][index].get('flexible') or {}
+        if block.body is None:
+            continue
+        reach = block.body.highest / case.speed_range[1]
+        few = entry.get('modes') is not None and reach < _GOOD_REACH
+        if few or entry.get('keep_up_to', _GOOD_REACH) < _GOOD_REACH:
+            kept = min(reach, entry.get('keep_up_to', _GOOD_REACH))
+            yield (f'foundations.{index}: {block.name} is known by modes up to {kept:.3g} times '
+                   f'the highest 1X frequency; {_GOOD_REACH:g} times leave less than 1%, 2 times '
+                   'up to 2.5%')

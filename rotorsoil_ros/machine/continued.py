@@ -1,0 +1,72 @@
+"""How what a support gives way by continues to vibrations that decay."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+import math
+
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.ground.continuation import Continuation, typical_size
+from rotorsoil_ros.ground.soil import second_opinion_of, singular_of
+from rotorsoil_ros.machine.support import Support
+
+# Samples from which the compliance is continued, and those of a piece between branch points.
+_SAMPLES = 120
+_PIECE_SAMPLES = 48
+
+# A piece is longer than this share of the highest frequency.
+_NO_PIECE = 1e-6
+# Relative to its end: in a shorter one no vibration is told, only the response.
+_NARROW = 0.03
+
+
+def _other(support: Support) -> Callable[[FloatArray], ComplexArray] | None:
+    """Return what a second opinion says of the same, where some soil has one."""
+    others = tuple(map(second_opinion_of, support.soil_models))
+    if all(other is own for other, own in zip(others, support.soil_models, strict=True)):
+        return None
+    return replace(support, soil_models=others).motion_compliance
+
+
+def continued(support: Support, span: tuple[float, float]) -> Continuation:
+    """Return the compliance without any mass, continued from frequencies in a span."""
+    low, high = span
+    omega = np.unique(np.concatenate([
+        np.linspace(low, high, _SAMPLES // 2),
+        np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
+    return Continuation.of(omega, support.motion_compliance, other=_other(support))
+
+
+def _singular(support: Support, span: tuple[float, float]) -> FloatArray:
+    """Return the branch points of all soils inside a span, rising [rad/s]."""
+    low, high = span
+    found = np.unique(np.concatenate([np.zeros(0), *map(singular_of, support.soil_models)]))
+    return np.asarray(found[(found > low + _NO_PIECE * high)
+                            & (found < (1.0 - _NO_PIECE) * high)])
+
+
+def continued_by_pieces(
+    support: Support, span: tuple[float, float],
+) -> tuple[Continuation, ...]:
+    """
+    Return continuations between the frequencies where the soil has branch points.
+
+    Each is fitted to frequencies of its own piece alone and holds for vibrations whose
+    frequency lies in it; all have one size. Between two branch points so close that no
+    function could be told from the next, there is none.
+    """
+    (low, high), singular = span, _singular(support, span)
+    if not singular.size:
+        return (continued(support, span),)
+    edges = np.concatenate([[low], singular, [high]])
+    edges = edges[np.diff(edges, prepend=-math.inf) > _NO_PIECE * high]
+    edges[-1] = high
+    along = 0.5 * (1.0 - np.cos(np.pi * np.arange(_PIECE_SAMPLES) / (_PIECE_SAMPLES - 1)))
+    samples = [left + (right - left) * along for left, right in pairwise(edges.tolist())
+               if right - left > _NARROW * right]
+    size = typical_size(support.motion_compliance(np.concatenate(samples)))
+    return tuple(Continuation.of(
+        omega, support.motion_compliance, size, _other(support),
+        (float(omega[0]), float(omega[-1]))) for omega in samples)

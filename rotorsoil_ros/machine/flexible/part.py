@@ -1,0 +1,263 @@
+"""What one foundation adds to a support: its motion over seats, contacts and probes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.channel import Channel, DOFS
+from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.machine.flexible.body import FlexibleBody, massless, PROBE
+from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.placement import Placement
+from rotorsoil_ros.rotor.bearing import Bearing
+
+# Elastic flexibility of contacts below this share of the largest would let no force tell them
+# apart.
+_TOLD_APART = 1e-12
+
+# Cosine below which a direction is across.
+_TURNED = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """
+    Where a bearing is.
+
+    Attributes
+    ----------
+    bearing : Bearing
+        Of some rotor.
+    height : float
+        Of its shaft above the contact [m].
+    place : Placement
+        Where that shaft lies.
+
+    """
+
+    bearing: Bearing
+    height: float
+    place: Placement
+
+    @property
+    def axes(self) -> FloatArray:
+        """Directions x and z of the machine in the axes of the ground, (2, 3)."""
+        return replace(self.place, x=0.0, y=0.0).seat_rows(
+            position=0.0, height=0.0, centre=(0.0, 0.0))[:, :3]
+
+    def on(self, body: FlexibleBody) -> FloatArray:
+        """
+        Return its x and z per motion of the interface of what it stands on, (2, p).
+
+        Raises
+        ------
+        RotorSoilError
+            If there is no such seat.
+
+        """
+        directions = self.axes
+        found = np.zeros((2, len(body.dofs)))
+        for along, axis in enumerate(DOFS[:3]):
+            share = np.where(np.abs(directions[:, along]) < _TURNED, 0.0, directions[:, along])
+            if share.any():
+                found[:, body.seat(self.bearing.seat or self.bearing.name, axis)] = share
+        return found
+
+
+@dataclass(frozen=True)
+class FoundationPart:
+    """
+    One foundation by its points: seats, then contacts, then probes.
+
+    Attributes
+    ----------
+    seats : tuple of int
+        Rows of the support's housings that its seats are.
+    contacts : tuple of Channel
+        Its contacts, six of a block.
+    probes : tuple of Channel
+        Other motions that are asked for.
+    mass : (6, 6) float array
+        Of the rigid body about the middle of its contact.
+    rows : (p, 6) float array
+        Motion of the points per rigid motion about there.
+    shapes : (p, m) float array
+        Of its elastic modes.
+    stiffness : (m,) complex array
+        Of these, w^2 (1 + i eta), at unit mass.
+    residual, massless : (p, p) complex and (p, g) float arrays
+        Flexibility of the rest with its loss, and shapes that make it up without.
+    residual_loss : float
+        Loss factor of the rest.
+    mean : (6, c) float array
+        Mean motion of the contact per motion of the contacts.
+
+    """
+
+    seats: tuple[int, ...]
+    contacts: tuple[Channel, ...]
+    probes: tuple[Channel, ...]
+    mass: FloatArray
+    rows: FloatArray
+    shapes: FloatArray
+    stiffness: ComplexArray
+    residual: ComplexArray
+    massless: FloatArray
+    residual_loss: float
+    mean: FloatArray
+
+    @classmethod
+    def of(cls, foundation: Foundation, mounts: Sequence['Mount']) -> 'FoundationPart':
+        """Return what a foundation is to bearings, those that stand on it among them."""
+        own = [index for index, mount in enumerate(mounts)
+               if mount.bearing.foundation == foundation.name]
+        seats = tuple(2 * index + axis for index in own for axis in range(2))
+        on_it = [mounts[index] for index in own]
+        if foundation.body is not None:
+            return cls._flexible(foundation.name, foundation.body, seats, on_it)
+        rows = [foundation.seat_rows(position=mount.bearing.position, height=mount.height,
+                                     place=mount.place) for mount in on_it]
+        six = tuple(Channel(foundation.name, '', dof) for dof in DOFS)
+        points = np.concatenate([*rows, np.eye(6)])
+        count = len(points)
+        return cls(seats, six, (), foundation.mass_matrix, points, np.zeros((count, 0)),
+                   np.zeros(0, dtype=complex), np.zeros((count, count), dtype=complex),
+                   np.zeros((count, 0)), 0.0, np.eye(6))
+
+    @classmethod
+    def _flexible(
+        cls, name: str, body: FlexibleBody, seats: tuple[int, ...], mounts: Sequence['Mount'],
+    ) -> 'FoundationPart':
+        contacts, probes = body.contacts.tolist(), body.of_kind(PROBE)
+        picked = np.concatenate([*(mount.on(body) for mount in mounts),
+                                 np.eye(len(body.dofs))[[*contacts, *probes]]])
+        residual = picked @ body.residual @ picked.T
+        # What no force acts on needs no shape of its own: it follows those of the others.
+        loaded = slice(0, len(picked) - len(probes))
+        springs = massless(residual[loaded, loaded], picked[loaded] @ body.static_size)
+        channels = [Channel(name if body.has_one_contact and row in contacts else
+                            body.dofs[row].station, '', body.dofs[row].axis)
+                    for row in (*contacts, *probes)]
+        return cls(seats, tuple(channels[:len(contacts)]), tuple(channels[len(contacts):]),
+                   body.mass_about_centre, picked @ body.about_centre, picked @ body.shapes,
+                   np.asarray(body.stiffness * (1.0 + 1j * body.loss)),
+                   np.asarray(residual / (1.0 + 1j * body.residual_loss)),
+                   residual[:, loaded] @ np.linalg.pinv(springs).T,
+                   body.residual_loss, body.mean_rows)
+
+    @property
+    def places(self) -> tuple[slice, slice, slice]:
+        """Where among the points seats, contacts and probes are."""
+        first, second = len(self.seats), len(self.seats) + len(self.contacts)
+        return slice(0, first), slice(first, second), slice(second, None)
+
+    @property
+    def is_patched(self) -> bool:
+        """Whether it stands on several contacts."""
+        return len(self.contacts) != len(DOFS) or self.contacts[0].station != (
+            self.contacts[-1].station)
+
+    def flexibility(self, omega: FloatArray) -> ComplexArray:
+        """Return the elastic motion of the points per force on them, (n, p, p) [m/N]."""
+        if not self.shapes.size:
+            return np.broadcast_to(self.residual, (len(omega), *self.residual.shape))
+        count = len(self.rows)
+        upper = np.triu_indices(count)
+        pairs = self.shapes[upper[0]] * self.shapes[upper[1]]
+        gain = 1.0 / (self.stiffness - omega[:, None] ** 2)
+        found = gain.real @ pairs.T + 1j * (gain.imag @ pairs.T)
+        total = np.empty((len(omega), count, count), dtype=complex)
+        total[:, upper[0], upper[1]] = found
+        total[:, upper[1], upper[0]] = found
+        return np.asarray(total + self.residual)
+
+    @cached_property
+    def on_contacts(self) -> 'ContactForm':
+        """
+        The same by the motion of its contacts and elastic coordinates of unit stiffness.
+
+        Raises
+        ------
+        RotorSoilError
+            If forces at its contacts could not be told apart.
+
+        """
+        _, contact, _ = self.places
+        elastic = np.concatenate([self.shapes / np.sqrt(self.stiffness.real), self.massless],
+                                 axis=1)
+        loss = np.concatenate([self.stiffness.imag / self.stiffness.real,
+                               np.full(self.massless.shape[1], self.residual_loss)])
+        inertia = np.concatenate([1.0 / self.stiffness.real, np.zeros(self.massless.shape[1])])
+        motion = np.concatenate([self.rows, elastic], axis=1)
+        turn = (_free_on_patches(self.rows[contact], elastic[contact], self.mass, inertia)
+                if self.is_patched else _free_on_one(self.rows[contact], elastic[contact]))
+        mass = turn.T @ scipy.linalg.block_diag(self.mass, np.diag(inertia)) @ turn
+        part = turn[6:]
+        own = len(self.contacts)
+        spring = part.T @ ((1.0 + 1j * loss)[:, None] * part)
+        # The elastic coordinates' own unit springs belong to the compliance.
+        spring[range(own, len(spring)), range(own, len(spring))] -= 1.0
+        return ContactForm(mass, spring, motion @ turn, turn[:6])
+
+
+@dataclass(frozen=True, slots=True)
+class ContactForm:
+    """
+    A foundation over its c contacts and e elastic coordinates, each on a spring of one.
+
+    Attributes
+    ----------
+    mass : (c + e, c + e) float array
+        Mass matrix.
+    spring : (c + e, c + e) complex array
+        Stiffness beyond the unit springs, with what it loses.
+    rows : (p, c + e) float array
+        Motion of the points.
+    rigid : (6, c + e) float array
+        Mean rigid motion of the body.
+
+    """
+
+    mass: FloatArray
+    spring: ComplexArray
+    rows: FloatArray
+    rigid: FloatArray
+
+
+def _free_on_one(rows: FloatArray, elastic: FloatArray) -> FloatArray:
+    """Return rigid and elastic motion per motion of one contact and elastic motion."""
+    inverse, count = np.linalg.inv(rows), elastic.shape[1]
+    return np.block([[inverse, -inverse @ elastic], [np.zeros((count, 6)), np.eye(count)]])
+
+
+def _free_on_patches(
+    rows: FloatArray, elastic: FloatArray, mass: FloatArray, inertia: FloatArray,
+) -> FloatArray:
+    """
+    Return rigid and elastic motion per motion of the contacts and of modes with these held.
+
+    References
+    ----------
+    Craig & Bampton (1968), Coupling of substructures for dynamic analyses, AIAA J. 6.
+
+    """
+    flexibility = elastic @ elastic.T
+    if np.linalg.cond(flexibility) > 1.0 / _TOLD_APART:
+        raise RotorSoilError(
+            f'residual must tell the forces of the {len(rows)} contacts apart, together with the '
+            f'modes, got a rank of {np.linalg.matrix_rank(flexibility, hermitian=True)}')
+    per_force = np.linalg.solve(flexibility, rows)
+    rigid = np.linalg.solve(rows.T @ per_force, per_force.T)
+    force = np.linalg.inv(flexibility) - per_force @ rigid
+    imposed = np.concatenate([rigid, elastic.T @ force])
+    # Rigid motion in units in which it counts as much as the elastic one.
+    unit = np.linalg.norm(elastic) / np.linalg.norm(rows)
+    held = scipy.linalg.null_space(np.concatenate([unit * rows, elastic], axis=1))
+    held[:6] *= unit
+    weight = scipy.linalg.block_diag(mass, np.diag(inertia))
+    _, modes = scipy.linalg.eigh(held.T @ weight @ held, held[6:].T @ held[6:])
+    return np.concatenate([imposed, held @ modes], axis=1)
