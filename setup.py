@@ -68,11 +68,13 @@ setup(
         ],
         'tables': ['openpyxl>=3.1.0', 'pyarrow>=14.0.1', 'pyuff>=2.4.6'],
         'viewer': ['rerun-sdk>=0.38'],
+        'zenoh': ['eclipse-zenoh>=1.2'],
         'test': [
             'amqtt>=0.12',
             'asyncua>=2.0',
             'cyclonedds>=11.0; sys_platform == "linux" and platform_machine == "x86_64"',
             'distributed>=2024.1',
+            'eclipse-zenoh>=1.2',
             'hypothesis>=6.100',
             'mypy>=1.10',
             'openpyxl>=3.1.0',

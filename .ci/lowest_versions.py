@@ -17,7 +17,7 @@ def bounds() -> list[str]:
     runpy.run_path('setup.py')
     extras = caught['extras_require']
     wanted = [*caught['install_requires'], *(
-        bound for name in ('ros', 'frames', 'tables', 'bags', 'mqtt', 'opcua')
+        bound for name in ('ros', 'frames', 'tables', 'bags', 'mqtt', 'opcua', 'zenoh')
         for bound in extras[name])]
     return sorted({f'{name}=={version}' for name, version in re.findall(
         r'^([\w-]+)(?:\[\w+\])?>=([\w.]+)', '\n'.join(wanted), re.MULTILINE)})

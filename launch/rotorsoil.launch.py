@@ -1,4 +1,8 @@
-"""Start the node: `ros2 launch rotorsoil_ros rotorsoil.launch.py case:=... or params:=...`."""
+"""
+Start the node: `ros2 launch rotorsoil_ros rotorsoil.launch.py case:=... or params:=...`.
+
+With `namespace:=hall_1,hall_2` it is one node for each of several halls.
+"""
 
 from pathlib import Path
 import re
@@ -33,7 +37,8 @@ def _node(context: LaunchContext) -> list[Node]:
         'machines': [machine], f'{machine}.case': case, 'log.directory': logs}]
     return [Node(
         package='rotorsoil_ros', executable='rotorsoil_node', name='rotorsoil',
-        namespace=namespace, output='screen', parameters=[params] if params else own)]
+        namespace=each, output='screen', parameters=[params] if params else own)
+        for each in namespace.split(',')]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -50,6 +55,7 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('params', default_value='',
                               description='YAML file of parameters instead of the above.'),
         DeclareLaunchArgument('namespace', default_value='',
-                              description='Namespace of the node and of all its topics.'),
+                              description='Namespace of the node and of all its topics; '
+                                          'several, by commas: a node for each.'),
         OpaqueFunction(function=_node),
     ])

@@ -34,6 +34,7 @@ OWNERS = {
     'yaml': {'case', 'bags'}, 'openpyxl': {'bags'}, 'pyuff': {'bags', 'case'}, 'rosbags': {'bags'},
     'pyarrow': {'bags', 'screen'},  # rerun itself needs it
     'asyncua': {'feeds'}, 'cryptography': {'feeds'}, 'google': {'feeds'}, 'paho': {'feeds'},
+    'zenoh': {'feeds'},
     'skfem': {'ground'}, 'rich': {'cli'}, 'csv': {'case', 'bags', 'figures', 'cli'},
 }
 LONGEST_ROOM, SHORTEST_ROOM = 400, 60

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 import re
 import runpy
+import shlex
 import shutil
 import subprocess
 import sys
@@ -228,8 +229,7 @@ def launched(monkeypatch):
     defaults = {name: said['default_value'] for name, said in arguments}
 
     def run(**asked):
-        [node] = start({**defaults, **asked})
-        return node
+        return start({**defaults, **asked})
     return run
 
 
@@ -241,15 +241,51 @@ def launched(monkeypatch):
 def test_a_launched_machine_is_called_as_its_case_says(launched, tmp_path, asked, machine, case):
     path = tmp_path / 'whatever.yaml'
     path.write_text('name: Mill fan-3\nsoil: {}\n')
-    node = launched(**{name: value.format(path) for name, value in asked.items()})
+    [node] = launched(**{name: value.format(path) for name, value in asked.items()})
     assert node['parameters'] == [{
         'machines': [machine], f'{machine}.case': case.format(path), 'log.directory': ''}]
     assert re.fullmatch('[a-z][a-z0-9_]*', machine)
 
 
 def test_launched_parameters_replace_all_else(launched):
-    node = launched(params='plant.yaml', case='fan.yaml', namespace='/hall_2')
+    [node] = launched(params='plant.yaml', case='fan.yaml', namespace='/hall_2')
     assert (node['parameters'], node['namespace']) == (['plant.yaml'], '/hall_2')
+
+
+def test_one_launch_file_starts_a_node_for_each_hall(launched):
+    """What it starts is `rotorsoil_node` in a namespace, as `test_two_halls_...` of the feeds."""
+    nodes = launched(case='plant_fan', machine='fan', namespace='hall_1,hall_2')
+    assert [node['namespace'] for node in nodes] == ['hall_1', 'hall_2']
+    assert nodes[0]['parameters'] == nodes[1]['parameters'] == [
+        {'machines': ['fan'], 'fan.case': 'plant_fan', 'log.directory': ''}]
+    assert {(node['executable'], node['name']) for node in nodes} == {
+        ('rotorsoil_node', 'rotorsoil')}
+
+
+def test_containers_start_what_is_installed_from_what_is_there(arguments):
+    """Nothing here builds an image: what can be held against the repository is."""
+    dockerfile = (ROOT / 'containers' / 'Dockerfile').read_text()
+    copied = [name for line in re.findall(r'^COPY (.+) \S+$', dockerfile, re.MULTILINE)
+              for name in line.split()]
+    assert copied
+    assert all((ROOT / name).exists() for name in copied)
+    compose = yaml.safe_load((ROOT / 'containers' / 'compose.yaml').read_text())
+    extras = re.findall(r'^ARG EXTRAS=(.+)$', dockerfile, re.MULTILINE)
+    scripts = [entry.split(' = ')[0] for entry in arguments['entry_points']['console_scripts']]
+    known = {'broker': 'mosquitto', 'viewer': 'rerun'}
+    for name, service in compose['services'].items():
+        program, *given = shlex.split(service['command'])
+        assert program == known.get(name) or program in scripts
+        if program == 'rotorsoil':
+            assert parse(given).run.startswith('live.feed:')
+        extras += [service.get('build', {}).get('args', {}).get('EXTRAS', 'ros')]
+        for volume in service.get('volumes', ()):
+            source = volume.split(':')[0]
+            assert source in compose['volumes'] or (ROOT / 'containers' / source).is_file()
+        for port in service.get('ports', ()):
+            assert port.startswith('127.0.0.1:')
+    assert {extra for each in extras for extra in each.split(',')} <= set(
+        arguments['extras_require'])
 
 
 def test_changelog_is_one_for_this_package():

@@ -51,7 +51,19 @@ def test_offline_verbs_need_no_ros(without_ros, tmp_path):
 
 
 def test_wire_and_bags_are_imported_without_ros(without_ros):
-    rooms = ('wire.messages', 'wire.handlers', 'bags.recorder', 'bags.feed', 'bags.comparison',
+    rooms = ('feeds.halls', 'feeds.mqtt', 'feeds.opcua',
+             'wire.messages', 'wire.handlers', 'bags.recorder', 'bags.feed', 'bags.comparison',
              'bags.predict', 'bags.synthetic', 'bags.retention')
     done = without_ros('-c', f'for room in {rooms}: __import__(f"rotorsoil_ros.{{room}}")')
     assert done.returncode == 0, done.stderr
+
+
+def test_a_feed_of_other_halls_needs_no_ros(without_ros):
+    """The address is one that nobody has: how far it gets tells that no part of ROS is missing."""
+    done = without_ros('-m', 'rotorsoil_ros.cli', 'feed', 'opcua', '--zenoh', 'tcp/127.0.0.1:1',
+                       '--endpoint', 'opc.tcp://192.0.2.1:1', '--insecure')
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith('--endpoint: opc.tcp://192.0.2.1:1: ')
+    done = without_ros('-m', 'rotorsoil_ros.cli', 'feed', 'opcua')
+    assert done.returncode == 2
+    assert "is not installed: pip install 'rotorsoil_ros[ros]'" in done.stderr

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import json
 import math
+from threading import Lock
+from typing import Protocol
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.errors import InputError
@@ -61,32 +63,41 @@ def places_in(topics: Mapping[str, str]) -> list[Speaker]:
         for name, kind in OWN_TOPICS.items())]
 
 
+class Taker(Protocol):
+    """Whoever takes messages as they come."""
+
+    def take(self, topic: str, cdr: bytes) -> None:
+        """Take one message of a topic."""
+
+
 class Inbox:
     """
-    Takes messages from one thread and gives them to another; neither ever waits.
+    Takes messages from one thread and gives them to another; neither waits for work of the other.
 
     Of what is a value only the last counts, and is decoded only when somebody reads it: a
     thousand speeds a second cost no more than one.
     """
 
     def __init__(self) -> None:
+        self._lock = Lock()
         self._last: dict[str, bytes] = {}
         self._reports: deque[bytes] = deque(maxlen=MOST_REPORTS)
 
     def take(self, topic: str, cdr: bytes) -> None:
         """Keep a message for whoever reads."""
-        if topic == DIAGNOSTICS_TOPIC:
-            self._reports.append(cdr)
-        elif topic in self._last or len(self._last) < MOST_TOPICS:
-            self._last[topic] = cdr
+        with self._lock:
+            if topic == DIAGNOSTICS_TOPIC:
+                self._reports.append(cdr)
+            elif topic in self._last or len(self._last) < MOST_TOPICS:
+                self._last[topic] = cdr
 
     def read(self) -> tuple[dict[str, bytes], list[bytes]]:
         """Return the last message of each topic that has spoken, and all diagnostics."""
-        last, self._last = self._last, {}
-        reports = []
-        while self._reports:
-            reports.append(self._reports.popleft())
-        return dict(last), reports
+        with self._lock:
+            last, self._last = self._last, {}
+            reports = list(self._reports)
+            self._reports.clear()
+        return last, reports
 
 
 @dataclass(frozen=True, slots=True)

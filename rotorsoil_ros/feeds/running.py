@@ -30,13 +30,6 @@ class Outlet(Protocol):
         """Tell until `stop` is set; say `ready` once it can be reached."""
 
 
-class Ear(Protocol):
-    """Who hears the node's topics, in the thread that calls."""
-
-    def hear(self, seconds: float) -> None:
-        """Take in what comes within some time."""
-
-
 class Telling:
     """
     An outlet at work in its thread.
@@ -92,10 +85,12 @@ def telling(
         told.end()
 
 
-def feed(source: Ear, told: Telling, *, until: Callable[[], bool]) -> bool:
-    """Hear until something holds; return whether the outlet told all the time."""
+def feed(
+    hear: Callable[[float], object], told: Telling, *, until: Callable[[], bool],
+) -> bool:
+    """Hear, some seconds each time, until something holds; return whether all was told."""
     while not until():
-        source.hear(NOTICE_S)
+        hear(NOTICE_S)
         if not told.is_alive:
             return False
     return True

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 
-from rotorsoil_ros.feeds.hearsay import HEARD, Inbox, MODEL, places_in, type_of
+from rotorsoil_ros.feeds.hearsay import HEARD, MODEL, places_in, Taker, type_of
 from rotorsoil_ros.node.interfaces import message_class
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC
@@ -19,6 +19,7 @@ from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC
 LOOK_S = 1.0  # how often the graph is searched for machines
 # Nobody resends to a feed, and nobody waits for one: the next value is worth more than the last.
 VALUES = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)  # of who sends them on
 REPORTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 MODELS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                     durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -28,13 +29,13 @@ class GraphListener(Node):  # type: ignore[misc]
     """
     Hears every machine of the graph, also those that come later, and puts bytes into an inbox.
 
-    It publishes nothing and offers no service.
+    It publishes nothing and offers no service. With `every`, each value is wanted, not the last.
     """
 
-    def __init__(self, inbox: Inbox, context: Context) -> None:
+    def __init__(self, inbox: Taker, context: Context, *, every: bool = False) -> None:
         super().__init__('rotorsoil_feed', context=context, start_parameter_services=False,
                          enable_rosout=False)
-        self._inbox = inbox
+        self._inbox, self._values = inbox, ALL if every else VALUES
         self._heard: set[str] = set()
         self._hear(DIAGNOSTICS_TOPIC, DIAGNOSTICS, REPORTS)
         self.create_timer(LOOK_S, self._look)
@@ -58,7 +59,7 @@ class GraphListener(Node):  # type: ignore[misc]
             for name in HEARD:
                 topic = f'/{place.node}/{place.machine}/{name}'
                 if topic not in self._heard:
-                    self._hear(topic, type_of(name), MODELS if name == MODEL else VALUES)
+                    self._hear(topic, type_of(name), MODELS if name == MODEL else self._values)
 
     def _hear(self, topic: str, kind: str, profile: QoSProfile) -> None:
         self._heard.add(topic)
@@ -67,14 +68,14 @@ class GraphListener(Node):  # type: ignore[misc]
 
 
 @contextmanager
-def listening(inbox: Inbox) -> Iterator[GraphListener]:
+def listening(inbox: Taker, *, every: bool = False) -> Iterator[GraphListener]:
     """Hear a graph in a context of its own."""
     from rclpy.signals import SignalHandlerOptions
 
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        listener = GraphListener(inbox, context)
+        listener = GraphListener(inbox, context, every=every)
         try:
             yield listener
         finally:

@@ -18,6 +18,7 @@ def add_feeds(verbs: Verbs) -> None:
     kinds = feed.add_subparsers(metavar='KIND', required=True)
     _add_opcua(kinds)
     _add_mqtt(kinds)
+    _add_zenoh(kinds)
     for kind in kinds.choices.values():
         kind.set_defaults(options=list(kind._option_string_actions))
 
@@ -63,7 +64,20 @@ def _add_mqtt(kinds: Verbs) -> None:
     _add_telling(mqtt)
 
 
+def _add_zenoh(kinds: Verbs) -> None:
+    zenoh = add_verb(kinds, 'zenoh', 'live.feed:zenoh',
+                     "send the node's topics on to other halls, where --zenoh hears them",
+                     case=False)
+    zenoh.add_argument('--connect', metavar='LOCATOR', action='append', default=[],
+                       help='router or other hall, as in tcp/router:7447; may be repeated')
+    zenoh.add_argument('--listen', metavar='LOCATOR', action='append', default=[],
+                       help='where others connect, as in tcp/0.0.0.0:7447; may be repeated')
+
+
 def _add_telling(kind: argparse.ArgumentParser) -> None:
+    kind.add_argument('--zenoh', metavar='LOCATOR', action='append', default=[],
+                      help='hear a router or a hall, as in tcp/router:7447, and no ROS graph; '
+                           'may be repeated')
     kind.add_argument('--period', metavar='S', type=PERIOD, default=1.0,
                       help='how often values are renewed [s] (default: %(default)s)')
     kind.add_argument('--units', choices=(PLANT, SI), default=PLANT,
