@@ -1,4 +1,4 @@
-"""How large is what the viewer is shown? `python -m benchmarks.recording` prints it by its parts."""
+"""How large is what the viewer is shown? `python -m benchmarks.recording` prints its parts."""
 
 from collections import Counter
 from pathlib import Path

@@ -162,7 +162,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self.get_logger().info(f'watching {", ".join(machines)}{where}')
 
     def _hand_out(self, slips: Sequence[str]) -> None:
-        """Let each machine tell what was set for it under a name that no parameter has."""
+        """Let each machine tell what is wrong with how it was set up; the first what is of all."""
         for number, watch in enumerate(self._watches):
             others = [f'parameter {each.name}.' for each in self._watches if each is not watch]
             watch.monitor.health.slips = tuple(
@@ -208,11 +208,14 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         """Tell if another node has the same name: both answer on the same topics."""
         own = self.get_name(), self.get_namespace()
         count = self.get_node_names_and_namespaces().count(own)
-        self._namesake_ticks = self._namesake_ticks + 1 if count > 1 else 0
+        before, self._namesake_ticks = self._namesake_ticks, (
+            self._namesake_ticks + 1 if count > 1 else 0)
         if self._namesake_ticks == NAMESAKE_TICKS:
-            self.get_logger().error(
+            self._hand_out([*self.settings.unknown(), (
                 f'{count} nodes are called {self.get_fully_qualified_name()}: answers are given '
-                f'more than once; rename one with __node or __ns')
+                'more than once; rename one with __node or __ns')])
+        elif before >= NAMESAKE_TICKS and not self._namesake_ticks:
+            self._hand_out(self.settings.unknown())
 
     def _report_log(self, log: RunLog) -> None:
         """Say on /diagnostics, and so in the log itself, how logging goes."""

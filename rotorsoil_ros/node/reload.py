@@ -79,9 +79,13 @@ class Reloader:
         errand, self._errand = self._errand, None
         self._timer.cancel()
         if errand.result is not None:
-            said = self._take(errand.result)
-            self._node.get_logger().info(said)
-            self._reply(said, is_done=True)
+            said, is_taken = f'{self._name}: the new case could not be taken: see the log', False
+            try:  # whoever waits is answered whatever it raises, which goes on to the log
+                said = self._take(errand.result)
+                is_taken = True
+                self._node.get_logger().info(said)
+            finally:
+                self._reply(said, is_done=is_taken)
         else:
             said = f'{errand.failure}; the old case stays'
             self._node.get_logger().error(said)

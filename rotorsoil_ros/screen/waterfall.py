@@ -83,10 +83,10 @@ class Waterfall:
         part = f'{self._entity}/picture/{self._count // PART_ROWS % PARTS}'
         grown = self._count % PART_ROWS + 1
         stamps, rows = np.array([stamp_ns]), list(self._rows)[:grown]
-        self._recording.send(part, stamps, [
+        self._recording.send(part, stamps, rr.ComponentColumnList([
             *rr.DepthImage.columns(buffer=[np.concatenate(rows).tobytes()], format=[
                 rr.components.ImageFormat(width=COLUMNS, height=grown, channel_datatype='U8')]),
-            *rr.Transform3D.columns(translation=[[0.0, -float(self._count), 0.0]])])
+            *rr.Transform3D.columns(translation=[[0.0, -float(self._count), 0.0]])]))
         turning = np.array(list(self._turning)[:grown + 1])  # from the end of the part before
         points = np.column_stack([self._frequency.place(turning),
                                   np.arange(len(turning)) + 0.5])[np.isfinite(turning)]

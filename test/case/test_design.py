@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import rotorsoil_ros as rs
+from rotorsoil_ros.case.design.influence import on_larger_blocks
 from rotorsoil_ros.case.design.inputs import INPUTS
 from rotorsoil_ros.case.design.report import Acceptance, HousingAnswer
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.units import rpm_to_rad_s
 
@@ -135,6 +136,32 @@ def test_remedy_is_the_machine_with_that_block(tmp_path):
     assert f'on a block 25% longer and wider {there:.3g} mm/s' in said
     now = 1e3 * found.housings[0].velocity[1]
     assert f'{now / 2.5:.3g} instead of {now:.3g} mm/s' in said
+
+
+@pytest.mark.parametrize('model', ['thin_layers', 'boundary_elements'])
+def test_ground_below_a_larger_block_is_solved_anew(model, cache):
+    own = {'support.model': model, 'speed_range_rpm': [100, 1000]}
+    larger = fan(cache, **own, **{
+        'foundations.0.half_width': 1.25, 'foundations.0.half_length': 1.875,
+        'foundations.0.mass': 19580.0 * 1.5625,
+        'foundations.0.inertia': [value * 1.5625**2 for value in (19.3e3, 10.9e3, 20.2e3)]})
+    machine = fan(cache, **own)
+    found = on_larger_blocks(machine.case, cache, 1.25).unbalance_response(
+        rpm_to_rad_s(np.array([900.0])), machine.case.unbalance)
+    np.testing.assert_allclose(
+        found.displacement, larger.response(rpm=900.0).displacement, rtol=1e-9)
+
+
+@pytest.mark.parametrize('settings, reason', [
+    ({'support.model': 'rigid'}, 'the support is rigid'),
+    ({'foundations': [
+        {'name': name, 'radius': 0.45, 'mass': 900.0, 'height': 1.0, 'centre_y': along}
+        for name, along in (('front', 0.0), ('back', 1.0))],
+      'rotor.bearings.0.foundation': 'front', 'rotor.bearings.1.foundation': 'back'},
+     'front and back would overlap')])
+def test_why_a_larger_block_is_no_remedy_is_said(settings, reason, tmp_path):
+    with pytest.raises(RotorSoilError, match=reason):
+        on_larger_blocks(fan(tmp_path, **settings).case, tmp_path, 1.25)
 
 
 @pytest.mark.parametrize('name', ['unst', 'unstable_without_a_word'])

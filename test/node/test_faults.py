@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 from rotorsoil_ros.bags.metadata import files as bag_files
 from rotorsoil_ros.bags.retention import new_directory
 from rotorsoil_ros.domain import own_domain
+from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.node.node import Survived
 from rotorsoil_ros.testing.graph import DEADLINE_S
 
@@ -109,6 +110,21 @@ def test_who_waits_for_a_reload_is_told_when_the_node_is_cleaned_up(bench, case)
     bench.graph.until(reloading.done, 'the answer')
     assert not reloading.result().success
     assert reloading.result().message.endswith('the old case stays')
+
+
+def test_who_waits_for_a_reload_is_answered_where_taking_it_raises(bench):
+    node = bench.active('fan')
+
+    def refuse(machine):
+        raise RotorSoilError(f'{machine.case.name} cannot be taken')
+
+    node._watches[0]._reloader._take = refuse
+    reloading = bench.ask(Trigger, '/rotorsoil/fan/reload', Trigger.Request())
+    with pytest.raises(RotorSoilError, match='cannot be taken'):
+        bench.graph.until(lambda: False, 'the failure')
+    bench.graph.until(reloading.done, 'the answer')
+    assert not reloading.result().success
+    assert reloading.result().message == 'fan: the new case could not be taken: see the log'
 
 
 def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, case, case_file):
@@ -237,6 +253,11 @@ def test_a_namesake_is_noticed_and_told_once(bench, capfd, monkeypatch):
     monkeypatch.setattr('rotorsoil_ros.node.node.NAMESAKE_TICKS', 2)
     told, hall = [], '/hall'  # where no node of another test has been
     node = bench.active('fan', cli=['--ros-args', '-r', f'__ns:={hall}'])
+    reports = bench.hear('/diagnostics', DiagnosticArray)
+
+    def is_reported():
+        last = [status.message for report in reports[-1:] for status in report.status]
+        return any(' nodes are called /hall/rotorsoil' in message for message in last)
 
     def is_told():
         told.append(capfd.readouterr().err)
@@ -245,7 +266,8 @@ def test_a_namesake_is_noticed_and_told_once(bench, capfd, monkeypatch):
     other = Context()
     rclpy.init(context=other, domain_id=own_domain())
     namesake = Node('rotorsoil', namespace=hall, context=other)
-    bench.graph.until(is_told, 'the error')
+    bench.graph.until(is_told, 'the warning')
+    bench.graph.until(is_reported, 'the diagnostics')
     for _ in range(3):
         node._look_for_namesakes()
     assert ''.join(told).count(' nodes are called') == 1
@@ -253,6 +275,7 @@ def test_a_namesake_is_noticed_and_told_once(bench, capfd, monkeypatch):
     namesake.destroy_node()
     other.shutdown()
     bench.graph.until(lambda: not node._namesake_ticks, 'the end of the namesake')
+    bench.graph.until(lambda: not is_reported(), 'the diagnostics of one alone')
 
 
 def test_what_a_callback_raises_is_told_once_and_survived():

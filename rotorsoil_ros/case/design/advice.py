@@ -1,7 +1,6 @@
 """What speaks against a machine, what is not known of it, and what to do next."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 import math
 from typing import TYPE_CHECKING
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.design.influence import Influence, larger_block, velocity
+from rotorsoil_ros.case.design.influence import Influence, on_larger_blocks, velocity
 from rotorsoil_ros.case.design.margins import NearModes, searched
 from rotorsoil_ros.case.design.report import Acceptance, GOOD_ZONES, HousingAnswer
 from rotorsoil_ros.case.summary import stability_doubts, unstable
@@ -162,10 +161,13 @@ def _remedies(machine: 'Machine', worst: HousingAnswer) -> list[str]:
         return []
     said = [f'Balanced one grade better the worst housing would have '
             f'{_MM * now / _GRADE_STEP:.3g} instead of {_MM * now:.3g} mm/s']
-    with suppress(RotorSoilError):  # such a block may be beyond the reach of its ground
-        larger = larger_block(model, _LARGER)
-        there = math.nan if larger is None else velocity(
-            case, larger, speed=worst.speed, channel=model.channels.index(worst.channel))
-        if math.isfinite(there):
-            said.append(f'on a block {_LARGER - 1.0:.0%} longer and wider {_MM * there:.3g} mm/s')
-    return said
+    block = f'a block {_LARGER - 1.0:.0%} longer and wider'
+    try:
+        larger = on_larger_blocks(case, machine.directory, _LARGER)
+        there = velocity(case, larger, speed=worst.speed,
+                         channel=model.channels.index(worst.channel))
+        if not math.isfinite(there):
+            raise RotorSoilError('there it has no steady answer')
+    except RotorSoilError as error:
+        return [*said, f'what it would have on {block} is not known: {error}']
+    return [*said, f'on {block} {_MM * there:.3g} mm/s']

@@ -2,7 +2,9 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import combinations
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -11,10 +13,7 @@ from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import INPUTS, UncertainInput
 from rotorsoil_ros.errors import RotorSoilError
-from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
-from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.neighbours import on_soil
+from rotorsoil_ros.ground.accuracy import gap
 from rotorsoil_ros.ground.plan import Part, Plan
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
 from rotorsoil_ros.machine.band import depends_on_soil
@@ -27,8 +26,6 @@ from rotorsoil_ros.machine.spread import UNBALANCE
 _ALONE = np.linspace(-1.0, 1.0, 9)
 # Machines that are looked at closely at one speed: a band over all speeds has fewer.
 _CLOSER = 256
-# Models of the ground that are made for another contact at once.
-_REBUILT = (ConeModel, EmbeddedConeModel, InfiniteElementModel)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,29 +142,38 @@ def velocity(case: Case, model: CoupledModel, *, speed: float, channel: int) -> 
     return float(abs(found[0, channel])) / math.sqrt(2.0)
 
 
-def larger_block(model: CoupledModel, factor: float) -> CoupledModel | None:
+def on_larger_blocks(case: Case, directory: Path, factor: float) -> CoupledModel:
     """
     Return a machine whose blocks are longer and wider by a factor, of the same height.
 
-    None where its ground would have to be solved anew.
+    Its ground is solved anew where it has to be, and stored in the cache.
+
+    Raises
+    ------
+    RotorSoilError
+        If nobody knows such a machine; the reason continues a sentence.
+
     """
-    if model.support.bends:
-        return None
-    blocks = tuple(_larger(block, factor) for block in model.foundations)
-    if not blocks or not all(isinstance(soil, _REBUILT)
-                             for soil in model.soil_models):
-        return None
-    return replace(model, foundations=blocks, soil_models=tuple(
-        on_soil(soil, soil.soil, block.contact) for soil, block
-        in zip(model.soil_models, blocks, strict=True)
-        if isinstance(soil, _REBUILT)))
+    if case.support.model in ('rigid', 'table'):
+        raise RotorSoilError('the support is rigid' if case.support.model == 'rigid' else
+                             'the table of the support knows the contact of this one only')
+    for block in case.foundations:
+        if block.body is not None:
+            raise RotorSoilError(f'{block.name} bends, and its file tells of this size only')
+    blocks = tuple(_larger(block, factor) for block in case.foundations)
+    for first, second in combinations(blocks, 2):
+        if gap(first.contact, second.contact, apart=(
+                second.centre_x - first.centre_x, second.centre_y - first.centre_y)) < 0.0:
+            raise RotorSoilError(f'{first.name} and {second.name} would overlap')
+    return models.coupled_model(replace(case, foundations=blocks), directory)
 
 
 def _larger(block: Foundation, factor: float) -> Foundation:
     mass, (x, y, z) = factor**2, block.inertia
     # Of a slab: mass with the area, inertia with the square of the sides too.
     return replace(block, contact=_scaled(block.contact, factor), mass=mass * block.mass,
-                   inertia=(mass**2 * x, mass**2 * y, mass**2 * z))
+                   inertia=(mass**2 * x, mass**2 * y, mass**2 * z),
+                   inertia_product=mass**2 * block.inertia_product)
 
 
 def _scaled(contact: Contact, factor: float) -> Contact:
