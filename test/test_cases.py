@@ -59,6 +59,7 @@ def test_a_file_that_is_cut_off_is_told(predicted):
 @pytest.mark.parametrize('log, words', [
     ('other_encodings/json.mcap', '/joint_states is sensor_msgs/msg/JointState (json)'),
     ('other_encodings/ros1.mcap', '/joint_states is sensor_msgs/msg/JointState (ros1)'),
+    ('other_encodings/ros1.mcap', 'rosbags-convert --src RUN.bag --dst RUN --dst-storage mcap'),
     ('other_encodings/msgzstd',
      '/paper_rotor/joint_states: each message is compressed with zstd (compression_mode MESSAGE)'),
     ('speed_in_another_type/float32.mcap',

@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 import re
+from typing import get_args, get_type_hints
 from xml.etree import ElementTree
 
+from foxglove import layouts
 import pytest
+from ros_parser.message_path import parse_message_path
 
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.wire.cdr import ARRAYS
@@ -61,6 +64,38 @@ def test_every_path_of_foxglove_is_published_and_its_place_is_the_channel_it_say
                 assert path['label'].split()[0] == names[int(index)]
             shown += 1
     assert shown > 10
+
+
+def test_foxglove_itself_knows_every_setting_of_a_plot(foxglove):
+    """Held against the types of its own package, which writes layouts."""
+    plots = [config for name, config in foxglove['configById'].items()
+             if name.startswith('Plot!')]
+    assert plots
+    for config in plots:
+        known = layouts.PlotConfig()._to_dict() | {'title': layouts.PlotPanel()}
+        assert set(config) <= set(known)
+        for name, kind in (('legendDisplay', 'legend_display'), ('xAxisVal', 'x_axis_val')):
+            assert config[name] in words(layouts.PlotConfig, kind)
+        for path in config['paths']:
+            assert set(path) <= set(layouts.PlotSeries()._to_dict())
+            assert path['timestampMethod'] in words(layouts.PlotSeries, 'timestamp_method')
+
+
+def words(kind, name):
+    """Return the words that a setting may be."""
+    return [word for choice in get_args(get_type_hints(kind)[name]) for word in get_args(choice)]
+
+
+def test_every_path_of_foxglove_is_one_number_of_a_message(foxglove):
+    """Held against an independent parser of its paths."""
+    paths = [path['value'] for config in foxglove['configById'].values()
+             for path in config.get('paths', ())]
+    for path in paths:
+        said = parse_message_path(path)
+        assert said.topic in TOPICS_OF_FAN
+        field, index = said.segments
+        assert field.field_name in ARRAYS
+        assert index.index >= 0
 
 
 def test_every_curve_of_plotjuggler_is_a_number_that_is_published(channels):

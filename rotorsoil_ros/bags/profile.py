@@ -22,6 +22,9 @@ from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USU
 SPEEDS_AT_ONCE = 1024
 MOST_TOLD = 8
 ADVICE = '; another number is read if its topic, field and unit are named (--speed-topic)'
+# What to do about messages that are not encoded as those of ROS 2.
+CONVERT = {'ros1': ': give the .bag of ROS 1 that it was made of, or convert that: '
+                   '`rosbags-convert --src RUN.bag --dst RUN --dst-storage mcap`'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,7 @@ def near_misses(sources: Iterable[Source], speed: SpeedSource = USUAL) -> list[s
         if not named or (named in SPEED_TOPICS and speed.topic):
             continue
         needed = TOPICS.get(named, IMU)
-        why = f'needed is {needed} ({CDR})'
+        why = f'needed is {needed} ({CDR})' + CONVERT.get(source.encoding, '')
         if source.encoding == CDR and named in SPEED_TOPICS and not speed.is_usual:
             why = speed.fits(source.type, source.definition)
         elif source.encoding == CDR and source.type == needed:
@@ -148,6 +151,7 @@ def _named(sources: Iterable[Source], speed: SpeedSource) -> Source:
         raise InputError(f'{topic}: no such topic; ' + (
             f'did you mean {near[0]}?' if near else f'there are {", ".join(names) or "none"}'))
     faults = {source: f'is encoded as {source.encoding}, needed is {CDR}'
+              + CONVERT.get(source.encoding, '')
               if source.encoding != CDR else speed.fits(source.type, source.definition)
               for source in there}
     fitting = [source for source, fault in faults.items() if not fault]
