@@ -186,15 +186,26 @@ def override(document: dict[str, Any], overrides: Sequence[str]) -> None:
     Raises
     ------
     InputError
-        If a setting has no `=`, or its path leads through something that is not there.
+        If a setting has no `=`, or its path leads through something that is not there; with a
+        line for each that is wrong.
 
     """
+    faults = []
     for setting in overrides:
-        path, equals, value = setting.partition('=')
-        source = f'--set {shown(setting)[1:-1]}'
-        if not equals or not all(path.split('.')):
-            raise InputError(f'{source}: must be key.path=value')
-        _put(document, path.split('.'), parse(value, source=source), source=source)
+        try:
+            _set(document, setting)
+        except InputError as error:
+            faults.append(str(error))
+    if faults:
+        raise InputError('\n'.join(faults))
+
+
+def _set(document: dict[str, Any], setting: str) -> None:
+    path, equals, value = setting.partition('=')
+    source = f'--set {shown(setting)[1:-1]}'
+    if not equals or not all(path.split('.')):
+        raise InputError(f'{source}: must be key.path=value')
+    _put(document, path.split('.'), parse(value, source=source), source=source)
 
 
 def replace_keys(document: dict[str, Any], given: Mapping[str, object]) -> None:

@@ -30,8 +30,7 @@ def load_all(
     Soils of one kind share a table, so that one case of each kind goes first. Several tables
     are computed by as many processes as there are cores.
     """
-    cases = {file: config.load(file, cache_directory=cache_directory)
-             for file in dict.fromkeys(files)}
+    cases = cases_of(files, cache_directory=cache_directory)
     directory = cache.directory(cache_directory)
     kinds: dict[str, Path] = {}
     for file, case in cases.items():
@@ -43,6 +42,21 @@ def load_all(
         tabulate([file for file, case in cases.items() if not _is_tabulated(case, directory)],
                  directory, tell=tell)
     return {file: _complete(file, cache_directory) for file in cases}
+
+
+def cases_of(
+    files: Iterable[Path], *, cache_directory: Path | None,
+) -> dict[Path, config.Case]:
+    """Read case files, each once; raise InputError with all that is wrong with all of them."""
+    cases, faults = dict[Path, config.Case](), []
+    for file in dict.fromkeys(files):
+        try:
+            cases[file] = config.load(file, cache_directory=cache_directory)
+        except InputError as error:
+            faults.append(str(error))
+    if faults:
+        raise InputError('\n'.join(faults))
+    return cases
 
 
 def soil_keys(case: config.Case) -> list[str]:

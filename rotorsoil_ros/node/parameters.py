@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from importlib.util import find_spec
 import math
 from pathlib import Path
@@ -22,6 +23,7 @@ from rclpy.parameter import Parameter
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.loading import cases_of
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.rules import Judging, Matching
 from rotorsoil_ros.units import rpm_to_rad_s, SPEED_UNITS
@@ -243,9 +245,25 @@ class Settings:
         return told
 
     def check(self) -> None:
-        """Raise InputError at the first value that breaks its rule."""
+        """Raise InputError with all that is wrong: values, and the cases that they name."""
+        found: list[str] = []
+
+        def told(read: Callable[[], Any]) -> Any:
+            try:
+                return read()
+            except InputError as error:
+                found.append(str(error))
+                return None
+
         for name in self._known:
-            self.value(name)
+            told(partial(self.value, name))
+        names = told(lambda: self.machines) or []
+        files = [told(partial(self.case_file, name)) for name in names]
+        for name in names:
+            told(partial(self.speed, name))
+        if found:
+            told(lambda: cases_of(filter(None, files), cache_directory=self.cache))
+            raise InputError('\n'.join(dict.fromkeys(found)))
 
     @property
     def machines(self) -> list[str]:

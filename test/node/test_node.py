@@ -252,6 +252,19 @@ def test_a_node_that_cannot_be_configured_says_why_in_one_line(
     assert complaint in lines[0]
 
 
+def test_all_that_is_wrong_with_parameters_and_cases_is_told_at_once(bench, tmp_path, capfd):
+    case = tmp_path / 'fan.yaml'
+    case.write_text('name: fan\n')
+    node = bench.node('fan', machines=['fan', 'mill'], fan__case=str(case), mill__case='',
+                      speed_reliability='sometimes', fan__speed__unit='knots')
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
+    said = capfd.readouterr().err
+    for line in ('parameter speed_reliability: must be one of best_effort, reliable',
+                 'parameter fan.speed.unit: must be one of', f'{case}: rotor: is missing',
+                 f'{case}: speed_range_rpm: is missing', 'parameter mill.case: must be the path'):
+        assert said.count(line) == 1
+
+
 def test_a_bug_in_a_transition_is_told_with_its_trace(bench, monkeypatch, capfd):
     node = bench.node('fan')
     monkeypatch.setattr(node, '_load', lambda: 1 / 0)

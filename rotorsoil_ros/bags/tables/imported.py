@@ -13,8 +13,10 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.bags.tables.cells import (
     amplitude_unit,
     Clock,
+    contradict,
     decimal_sign,
     EARLIEST_NS,
+    holds_numbers,
     number,
     PHASE_UNITS,
     plain_unit,
@@ -134,15 +136,13 @@ class _Columns:
                                    if isinstance(cell, str)), delimiter)
 
     def _below_units(self) -> Iterator[tuple[int, list[Cell]]]:
-        """Yield the rows with numbers; a row of units may stand between them and the names."""
-        for at, (number_, cells) in enumerate(self._headed.rows):
-            if at == 0 and self._headed.header and not any(
-                    isinstance(cell, (int, float)) or any(sign.isdigit() for sign in str(cell))
-                    for cell in cells if cell is not None):
-                for place, cell in enumerate(cells[:len(self._headed.header)]):
-                    if cell and not self._headed.unit(place):
-                        self._headed.header[place] += f' [{str(cell).strip(" []()")}]'
-                continue
+        """Yield the rows with numbers; one of units may be the last between them and the names."""
+        header, rows = self._headed.header, self._headed.rows
+        first = next((at for at, (_, cells) in enumerate(rows) if holds_numbers(cells)), 0)
+        for place, cell in enumerate(rows[first - 1][1][:len(header)] if first and header else ()):
+            if cell and not self._headed.unit(place):
+                header[place] += f' [{str(cell).strip(" []()")}]'
+        for number_, cells in rows[first if header else 0:]:
             if any(str(cell).strip() for cell in cells if cell is not None):
                 yield number_, cells
 
@@ -238,11 +238,10 @@ class _Columns:
 
     def _agree(self, place: tuple[str, ...], column: Column, said: str) -> None:
         """Refuse a unit of which the name of its column says another."""
-        titled = plain_unit(self._titled(column)).split()
-        mine = plain_unit(said).split()
-        if said and titled and mine[0] != titled[0] and titled[0] in KNOWN and mine[0] in KNOWN:
-            self._fault(place, f'must agree with the name of the column, which says '
-                        f'{" ".join(titled)!r}, got {said!r}')
+        titled = plain_unit(self._titled(column))
+        if said and titled and contradict(plain_unit(said), titled):
+            self._fault(place, f'must agree with the name of the column, which says {titled!r}, '
+                               f'got {said!r}')
 
     def _titled(self, column: Column) -> str:
         place = self._place(column)
@@ -313,7 +312,8 @@ class _Columns:
                                    if cell is not None)
         if not dates and unit not in TIME_UNITS:
             self._fault(('time', 'unit'), f'must be said: {", ".join(TIME_UNITS)}; or a format '
-                        'of dates, `iso` or as in "%d.%m.%Y %H:%M:%S"')
+                        'of dates, `iso`, `excel` or as in "%d.%m.%Y %H:%M:%S"; or '
+                        '`elapsed`')
             return np.arange(len(cells), dtype=np.int64)
         clock = Clock(unit='' if said.format else unit if unit in TIME_UNITS else '',
                       form=said.format, zone=said.zone)
@@ -344,11 +344,6 @@ class _Columns:
         if dated[-1] > LAST_STAMP or dated[0] <= 0:
             self._faults.append(f'{self._table}: time: must lie between 1970 and 2038')
         return np.asarray(dated, dtype=np.int64)
-
-
-# Words that are units, so that two different ones contradict each other.
-KNOWN = frozenset({'rpm', 'hz', 'rad/s', 'deg/s', 'deg', 'rad', 'um', 'mm', 'm', 'mil', 'mils',
-                   'mm/s', 'm/s', 'in/s', 'ips', 'g', 'm/s^2'})
 
 
 def _states(

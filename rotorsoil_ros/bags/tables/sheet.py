@@ -5,13 +5,14 @@ from collections.abc import Iterator, Sequence
 import csv
 from dataclasses import dataclass
 from difflib import get_close_matches
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 import re
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from rotorsoil_ros.bags.tables.cells import holds_numbers
 from rotorsoil_ros.errors import InputError
 
 Cell: TypeAlias = Any  # text, a number, a date or None, as the file has it
@@ -64,20 +65,46 @@ class Sheet:
 
         """
         names = [name for name in wanted if isinstance(name, str)]
-        best = max(islice(enumerate(self.rows), HEADER_WITHIN), default=None, key=lambda row: (
-            sum(bool(_matches(name, row[1][1])) for name in names), -row[0]))
-        if best is None:
+        if not self.rows:
             raise InputError(f'{self.source}: is empty')
-        at, (number, cells) = best
-        if not names:  # columns by their numbers: every row is one of numbers
-            return Headed([], self.rows, number - 1)
-        header = [str(cell or '').strip() for cell in cells]
-        missing = [name for name in names if not _matches(name, cells)]
+        if not names:  # columns by their numbers
+            return self._numbered()
+        header, below = max(self._headers(), key=lambda one: (
+            sum(bool(_matches(name, one[0])) for name in names), -one[1]))
+        missing = [name for name in names if not _matches(name, header)]
         if missing:
             raise InputError('\n'.join(
                 f'{self.source}: has no column {name!r}{_near(name, header)}; there are '
                 f'{", ".join(filter(None, header)) or "none"}' for name in missing))
-        return Headed(header, self.rows[at + 1:], number)
+        return Headed(header, self.rows[below:], self.rows[below - 1][0])
+
+    def _numbered(self) -> 'Headed':
+        """Return the rows below names that stand on top of columns which nobody calls by them."""
+        first = next((at for at, (_, cells) in enumerate(self.rows[:HEADER_WITHIN])
+                      if holds_numbers(cells)), 0)
+        header = [] if first == 0 else [_text(cell) for cell in self.rows[first - 1][1]]
+        return Headed(header, self.rows[first:], self.rows[first][0] - 1)
+
+    def _headers(self) -> Iterator[tuple[list[str], int]]:
+        """Yield what may name the columns, and which row is the first below it."""
+        for at, (_, cells) in enumerate(self.rows[:HEADER_WITHIN], 1):
+            yield [_text(cell) for cell in cells], at
+            # A name may go over two rows, of which the upper is of several columns.
+            if at < len(self.rows) and not holds_numbers(cells) and not holds_numbers(
+                    self.rows[at][1]):
+                yield _joined(cells, self.rows[at][1]), at + 1
+
+
+def _text(cell: Cell) -> str:
+    return '' if cell is None else str(cell).strip()
+
+
+def _joined(upper: Sequence[Cell], lower: Sequence[Cell]) -> list[str]:
+    names, group = [], ''
+    for above, below in zip_longest(map(_text, upper), map(_text, lower), fillvalue=''):
+        group = above or group
+        names.append(' '.join(filter(None, (group if below else above, below))))
+    return names
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from datetime import datetime
 import math
 from pathlib import Path
+import struct
 
 import numpy as np
 from openpyxl import Workbook
@@ -88,6 +89,10 @@ SPELLED = {
     'latin letters': (
         'Time [s];Speed (U/min);A [µm p-p];P [°]\n0;600;20;90\n1,5;1200;5;-90\n', 'cp1252'),
     'a row of units': ('Time,Speed,A,P\ns,rpm,um p-p,deg\n0,600,20,90\n1.5,1200,5,-90\n', 'utf-8'),
+    'a row of units with digits': (
+        'Time,Speed,A,P\ns,1/min,um p-p,deg\n0,600,20,90\n1.5,1200,5,-90\n', 'utf-8'),
+    'a word above the names': (
+        'Run,,DE,\nTime,Speed,A,P\ns,rpm,um p-p,deg\n0,600,20,90\n1.5,1200,5,-90\n', 'utf-8'),
     'all in quotes': ('"Time","Speed","A","P"\n"0","600","20","90"\n"1.5","1200","5","-90"\n',
                       'utf-8'),
     'a separator that is told': ('sep=|\nTime|Speed|A|P\n0|600|20|90\n1.5|1200|5|-90\n', 'utf-8'),
@@ -103,6 +108,33 @@ def test_however_it_is_spelled_it_is_the_same_run(tmp_path, spelled):
     np.testing.assert_allclose(read_profile(out).speed_rpm, [600.0, 1200.0], rtol=1e-12)
     assert np.diff(read_profile(out).stamp_ns).tolist() == [1_500_000_000]
     np.testing.assert_allclose(measured(out, 'amplitude').position[:, 0], [10e-6, 2.5e-6])
+
+
+def test_names_may_go_over_two_rows_of_which_one_is_of_several_columns(tmp_path):
+    text = 'Time,Speed,DE,,NDE,\n,,A,P,A,P\ns,rpm,um p-p,deg,um p-p,deg\n0,600,20,90,4,1\n'
+    said = mapped(**{DE: (amplitude(column='DE A'), phase(column='DE P')),
+                     NDE: (amplitude(column='NDE A'), phase(column='NDE P'))})
+    _, out = imported(tmp_path, text, said)
+    np.testing.assert_allclose(measured(out, 'amplitude').position, [[10e-6, 2e-6]])
+    by_number = mapped({'column': 1, 'unit': 's'}, {'column': 2, 'unit': 'rpm'}, **{
+        DE: (amplitude(column=3), phase(column=4)), NDE: (amplitude(column=5), phase(column=6))})
+    _, out = imported(tmp_path, text, by_number)
+    np.testing.assert_allclose(measured(out, 'amplitude').position, [[10e-6, 2e-6]])
+
+
+def test_other_tongues_say_the_same_units(tmp_path):
+    text = 'Temps [s];Vitesse [tr/min];A [µm c-c];P [degrés]\n0;600;20;90\n1,5;1200;5;-90\n'
+    said = mapped({'column': 'Temps'}, {'column': 'Vitesse'}, **{DE: (
+        {'column': 'A'}, {'column': 'P', 'sense': 'lag'})})
+    _, out = imported(tmp_path, text, said, encoding='cp1252')
+    np.testing.assert_allclose(read_profile(out).speed_rpm, [600.0, 1200.0], rtol=1e-12)
+    np.testing.assert_allclose(measured(out, 'amplitude').position[:, 0], [10e-6, 2.5e-6])
+
+
+@pytest.mark.parametrize('cell', ['n.a.', '#NV', '---', 'k.A.', '#DIV/0!', 'NaN'])
+def test_a_cell_that_says_nothing_is_not_measured(tmp_path, cell):
+    _, out = imported(tmp_path, PLAIN + f'2,1300,{cell},{cell}\n')
+    assert np.isfinite(measured(out, 'amplitude').position[:, 0]).tolist() == [True, True, False]
 
 
 def test_units_may_stand_in_the_header_alone(tmp_path):
@@ -142,6 +174,8 @@ def test_every_unit_of_a_plant_is_zero_to_peak_in_si(tmp_path, unit, position, v
     ({'column': 'Time', 'unit': 'ms'}, ('0', '1500'), 1.5),
     ({'column': 'Time', 'unit': 'min'}, ('0', '2'), 120.0),
     ({'column': 'Time', 'format': '%H:%M:%S'}, ('23:59:59', '00:00:01'), 2.0),
+    ({'column': 'Time', 'format': 'elapsed'}, ('30:59:59.5', '2 00:00:01.5'), 61202.0),
+    ({'column': 'Time', 'format': 'elapsed'}, ('0:01', '1:01.25'), 60.25),
     ({'column': 'Time', 'format': '%H:%M:%S.%f'}, ('10:00:00.25', '10:00:00.75'), 0.5),
     ({'every': 0.25}, ('', ''), 0.25), ({'every': 'turn'}, ('', ''), 0.1)])
 def test_time_is_kept_and_dated_where_the_table_has_no_date(tmp_path, time, cells, seconds):
@@ -160,6 +194,7 @@ def test_time_is_kept_and_dated_where_the_table_has_no_date(tmp_path, time, cell
     ({'column': 'Time', 'format': '%d.%m.%Y %H:%M:%S.%f', 'zone': 'Europe/Berlin'},
      '01.07.2026 10:00:00,5', '2026-07-01T08:00:00.5'),
     ({'column': 'Time', 'unit': 's'}, '1772359200.5', '2026-03-01T10:00:00.5'),
+    ({'column': 'Time', 'format': 'excel'}, '46082,4375', '2026-03-01T10:30:00'),
     ({'column': 'Time', 'unit': 's', 'start': '2026-03-01T10:00:00'}, '0.5',
      '2026-03-01T10:00:00.5')])
 def test_a_date_is_a_date(tmp_path, time, cells, first):
@@ -257,6 +292,18 @@ def test_a_unit_that_the_header_contradicts_is_refused(tmp_path):
         imported(tmp_path, PLAIN.replace('A', 'A [mm/s rms]'))
 
 
+@pytest.mark.parametrize('titled, said, agree', [
+    ('um p-p', 'um 0-p', False), ('mils', 'mil p-p', True), ('ips', 'in/s pk', True),
+    ('micron pk-pk', 'um p-p', True), ('mm/s', 'm/s rms', False), ('deg', 'um p-p', False)])
+def test_units_agree_by_what_they_mean(tmp_path, titled, said, agree):
+    text = PLAIN.replace('A', f'A [{titled}]')
+    if agree:
+        assert imported(tmp_path, text, mapped(**{DE: (amplitude(said), phase())}))
+    else:
+        with pytest.raises(InputError, match='must agree with the name of the column'):
+            imported(tmp_path, text, mapped(**{DE: (amplitude(said), phase())}))
+
+
 def test_a_name_that_two_columns_have_is_refused_with_their_numbers(tmp_path):
     text = 'Time,Speed,A,A,P\n0,600,1,2,3\n'
     with pytest.raises(InputError, match=r"'A' names 2 columns.*3, 4"):
@@ -299,7 +346,7 @@ def test_a_workbook_is_read_with_its_dates_and_the_sheet_that_is_named(tmp_path)
         import_table(tmp_path / 'no.xlsx', said, tmp_path / 'b.mcap')
 
 
-def universal(path, *, complex_data, spec=19):
+def universal(path, *, complex_data, spec=19, is_even=False):
     """Write speed over the abscissa of data set 58 with an independent writer."""
     speeds = np.array([600.0, 1200.0])
     vector = np.array([10e-6 * np.exp(-0.5j * np.pi), 2.5e-6 * np.exp(0.5j * np.pi)])
@@ -307,14 +354,27 @@ def universal(path, *, complex_data, spec=19):
         func_type=1, rsp_node=12, rsp_dir=1, ref_dir=1, ref_node=1, binary=0, id1='DE hor',
         data=vector if complex_data else np.abs(vector), x=speeds, abscissa_spec_data_type=spec,
         abscissa_axis_units_lab='rpm', ordinate_axis_units_lab='m', ordinate_spec_data_type=8,
-        abscissa_spacing=0, ord_data_type=6 if complex_data else 4, num_pts=2,
+        abscissa_spacing=int(is_even), abscissa_min=600.0, abscissa_inc=600.0,
+        ord_data_type=6 if complex_data else 4, num_pts=2,
         orddenom_spec_data_type=0)
     pyuff.UFF(str(path)).write_sets([found], mode='overwrite')
 
 
-@pytest.mark.parametrize('complex_data', [True, False])
-def test_a_universal_file_is_read_with_vectors_or_amplitudes(tmp_path, complex_data):
-    universal(tmp_path / 'run.uff', complex_data=complex_data)
+def in_binary(path):
+    """Turn the numbers of a universal file into the binary ones of a data set 58b."""
+    lines = path.read_text().splitlines()
+    numbers = [float(number) for line in lines[13:-1] for number in line.split()]
+    data = struct.pack(f'<{len(numbers)}d', *numbers)
+    head = f'    58b{1:6d}{2:6d}{11:12d}{len(data):12d}{0:6d}{0:6d}{0:12d}{0:12d}'
+    path.write_bytes('\n'.join([lines[0], head, *lines[2:13], '']).encode() + data
+                     + b'\n    -1\n')
+
+
+@pytest.mark.parametrize('complex_data, is_binary', [(True, False), (False, False), (True, True)])
+def test_a_universal_file_is_read_with_vectors_or_amplitudes(tmp_path, complex_data, is_binary):
+    universal(tmp_path / 'run.uff', complex_data=complex_data, is_even=is_binary)
+    if is_binary:
+        in_binary(tmp_path / 'run.uff')
     name = 'DE hor amplitude' if complex_data else 'DE hor'
     parts = (amplitude('m', name), phase('lead', 'DE hor phase', 'rad'))
     out = tmp_path / 'out.mcap'
