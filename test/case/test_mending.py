@@ -55,9 +55,8 @@ FAN = [
      'foundations.0.half_width: must be > 0 m and finite, got -1'),
     (put('foundations.0.mass', -5.0), 'foundations.0.mass: must be >= 0 kg and finite, got -5'),
     (put('foundations.0.height', 0.0), 'foundations.0.height: must be > 0 m and finite, got 0'),
-    (put('foundations.0.embedment', 0.5),
-     'foundations.0.embedment: belongs to the support model thin_layers, got 0.5 with the model '
-     'cone, which takes every block as standing on the surface'),
+    (put('foundations.0.embedment', -0.5),
+     'foundations.0.embedment: must be >= 0 m and finite, got -0.5'),
     (put('foundations.0.inertia', [1.0, 'two', 3.0]),
      "foundations.0.inertia.1: must be a finite number in kg m^2, got 'two'"),
     (put('rotor.shaft_height', 'high'),
