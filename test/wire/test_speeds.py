@@ -158,6 +158,21 @@ def test_a_drive_that_counts_backwards_tells_both():
     assert (found.speed.tolist(), found.angle.tolist()) == ([148.0], [-1.0])
 
 
+@pytest.mark.parametrize('kind, values, field', [
+    *((f'std_msgs/msg/{name}', (99,), '') for name in (
+        'Int8', 'Int16', 'Int32', 'Int64', 'UInt8', 'UInt16', 'UInt32', 'UInt64', 'Float32')),
+    (f'{THIRD}Twist', (vector(7.0, 8.0, 9.0), vector(0.0, 0.0, 99.0)), 'angular.z'),
+    (f'{THIRD}TwistStamped', (header(), twist(0.0, 0.0, 99.0)), 'twist.angular.z'),
+    (f'{THIRD}Vector3Stamped', (header(), vector(99.0, 0.0, 0.0)), 'vector.x')])
+def test_usual_types_are_known_where_a_bag_does_not_tell_of_what_they_are_made(
+        kind, values, field):
+    """As one of SQLite before Iron does not."""
+    source = SpeedSource(field=field, unit='rpm', ratio=-2.0)
+    assert not source.fits(kind, '')
+    found, _ = told(kind, [sent(kind, *values)], field=field, unit='rpm', ratio=-2.0)
+    np.testing.assert_allclose(found.speed, [-2.0 * 99.0 * SPEED_UNITS['rpm']])
+
+
 def test_a_velocity_is_found_by_its_number_where_joints_have_no_names():
     found, _ = told(JOINT_STATE, [states(names=())], field='velocity[1]')
     assert found.speed.tolist() == [37.0]
