@@ -35,7 +35,7 @@ from rotorsoil_ros.ground.soil import (
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.rotor.coefficients import Coefficients, values as values_of
-from rotorsoil_ros.units import GRAVITY, rad_s_to_hz, rad_s_to_rpm
+from rotorsoil_ros.units import GRAVITY, rad_s_to_hz, rad_s_to_rpm, Units
 
 # Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
 # quarter.
@@ -50,6 +50,9 @@ _LARGEST_POISSON_RATIO = 0.45
 _HEAVIEST = 2.5e6
 _VORTICES, _TURBULENT = 41.0, 1000.0
 _LIGHTEST, _OF_THRESHOLD = 0.05, 0.8
+
+# Cross terms that differ by less than this share of all coefficients are symmetric.
+_SYMMETRIC = 1e-12
 
 # Of the shaft's length: beyond, slopes are no longer small and no linear beam holds.
 _SURVIVED = 0.05
@@ -101,6 +104,7 @@ def derived_quantities(
     yield from of_site(case, soil_models)
     for journal in case.journals:
         yield from _of_journal(case, journal)
+    yield from _of_seals(case)
     if band_contents(case):
         yield 'edges of the band hold', band_contents(case)
 
@@ -164,6 +168,25 @@ def _of_journal(case: Case, journal: Journal) -> Iterator[tuple[str, str]]:
             if threshold < math.inf else
             f'whirls nowhere up to {rad_s_to_rpm(float(journal.states.speed[-1])):.5g} rpm '
             '(textbook)')
+
+
+def _of_seals(case: Case) -> Iterator[tuple[str, str]]:
+    """Yield below which frequency cross-coupling outdoes the damping of bearings and seals."""
+    films = {journal.name for journal in case.journals}
+    speed = np.array(case.speed_range)
+    for bearing in case.rotor.bearings:
+        if bearing.name in films:
+            continue
+        stiffness, damping, _ = bearing.coefficients(speed, speed)
+        skew = 0.5 * np.abs(stiffness[:, 1, 0] - stiffness[:, 0, 1])
+        direct = 0.5 * np.trace(damping, axis1=1, axis2=2)
+        if np.any(skew > _SYMMETRIC * np.abs(stiffness).max()):
+            with np.errstate(divide='ignore'):
+                slow, fast = (skew / direct).tolist()
+            yield f'{bearing.name}: alone it feeds whirl', (
+                f'slower than {rad_s_to_hz(slow):.4g} to {rad_s_to_hz(fast):.4g} Hz over the '
+                f'speed range, {fast / speed[1]:.3g} times the speed at its end (textbook, cross '
+                'stiffness over damping)')
 
 
 def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
@@ -285,6 +308,20 @@ def unstable(found: Stability) -> Iterator[str]:
         yield f'unstable {where}: {one.name} ({how}) grows, fed by {fed}'
 
 
+def stability_told(found: Stability, units: Units) -> str:
+    """Return in one line whether a machine is stable, and between which speeds."""
+    low, high = (units.speed(speed) for speed in found.span)
+    if found.doubt:
+        return 'not known, see the warning'
+    if found.instabilities:
+        ranges = ', '.join(f'{units.speed(start)} to {units.speed(end)}'
+                           for start, end in found.unstable.tolist())
+        return f'UNSTABLE, {ranges}: no steady response there, see the errors'
+    how = 'no bearing gives energy' if not found.highest else (
+        f'every mode up to {rad_s_to_hz(found.highest):.4g} Hz decays')
+    return f'stable from {low} to {high}: {how}'
+
+
 def clipped(span: tuple[float, float], wanted: tuple[float, float]) -> list[str]:
     """Return a remark where tables of bearings end before speeds [rad/s] that are looked at."""
     if wanted[0] >= span[0] and wanted[1] <= span[1]:
@@ -298,9 +335,12 @@ def stability_doubts(found: Stability) -> Iterator[str]:
     """Yield what is not known of the stability of a machine."""
     if found.doubt:
         yield f'whether the machine is stable is not known: {found.doubt}'
-    if found.untold_above < math.inf:
-        yield (f'whether a mode above {rad_s_to_hz(found.untold_above):.4g} Hz is stable is not '
-               'known: the support is not known there, and a bearing could feed one')
+    for which, edge, why in (
+            ('below', found.untold_below, 'tables of bearings begin there'),
+            ('above', found.untold_above, found.untold_why)):
+        if 0.0 < edge < math.inf:
+            yield (f'whether a mode {which} {rad_s_to_hz(edge):.4g} Hz is stable is not known: '
+                   f'{why}')
 
 
 def undecided(case: Case, error: NotSolvedError) -> str:

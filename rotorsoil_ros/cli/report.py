@@ -24,6 +24,7 @@ from rotorsoil_ros.case.summary import (
     implausible,
     near_threshold,
     stability_doubts,
+    stability_told,
     undecided,
     unstable,
     warnings,
@@ -43,7 +44,7 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.damping import DampingSplitter, LARGEST_DAMPING_RATIO
 from rotorsoil_ros.machine.modes.critical import asked, critical_speeds
 from rotorsoil_ros.machine.modes.names import ModeNames
-from rotorsoil_ros.machine.modes.stability import Stability, stability
+from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.machine.peaks import Peak, resonances
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, Units
@@ -79,7 +80,7 @@ def _check(arguments: Namespace, overrides: Sequence[str], units: Units) -> int:
                 model, (case.speed_range[0], BEYOND * case.speed_range[1])))
     shapes = shape_errors(case, model.support.soils, directory)
     _print_table(derived_quantities(case, model.soil_models, shapes))
-    _print_table(_stability(table.stability, units))
+    _print_table([('stability', stability_told(table.stability, units))])
     _print_table(criticals)
     peaks = _peaks(case, table)
     _print_table(_of_peaks(peaks, units))
@@ -206,20 +207,6 @@ def _solved(
     yield (f'{block}: largest error of the solver',
            f'{table.measured_error:.2g}, at unseen frequencies')
     yield f'{block}: file', str(cache.Cache(directory).path('compliance', key_of(soil)))
-
-
-def _stability(found: Stability, units: Units) -> Iterable[tuple[str, str]]:
-    low, high = (units.speed(speed) for speed in found.span)
-    if found.doubt:
-        yield 'stability', 'not known, see the warning'
-    elif found.instabilities:
-        ranges = ', '.join(f'{units.speed(start)} to {units.speed(end)}'
-                           for start, end in found.unstable.tolist())
-        yield 'stability', f'UNSTABLE, {ranges}: no steady response there, see the errors'
-    else:
-        how = 'no bearing gives energy' if not found.highest else (
-            f'every mode up to {rad_s_to_hz(found.highest):.4g} Hz decays')
-        yield 'stability', f'stable from {low} to {high}: {how}'
 
 
 def _criticals(

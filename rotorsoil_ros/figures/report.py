@@ -11,6 +11,7 @@ from pathlib import Path
 import re
 
 import rotorsoil_ros
+from rotorsoil_ros.case.summary import stability_told
 from rotorsoil_ros.figures import html
 from rotorsoil_ros.figures.comparison import all_figures, document, HEADER, rows
 from rotorsoil_ros.monitor.comparison import Comparison
@@ -18,7 +19,7 @@ from rotorsoil_ros.monitor.identification.case import Identification
 from rotorsoil_ros.monitor.identification.sentence import in_a_sentence
 from rotorsoil_ros.monitor.passage import Passage
 from rotorsoil_ros.monitor.verdict import Verdict
-from rotorsoil_ros.units import rad_s_to_rpm
+from rotorsoil_ros.units import rad_s_to_rpm, Units
 
 _DPI = 110
 _LONGEST_NAME = 100
@@ -159,6 +160,8 @@ def page(
     parts.append(html.listed(exclusions(comparison)))
     if comparison.peaks:
         parts += ['<h2>Peaks</h2>', html.table(*peak_table(comparison))]
+    parts += ['<h2>Stability of the model</h2>', '<p>' + escape(stability_told(
+        comparison.expectation.table.stability, Units())) + '</p>']
     if comparison.expectation.criticals:
         parts += ['<h2>Critical speeds of the model</h2>', html.table(
             ['speed [rpm]', 'whirl', 'damping ratio'],

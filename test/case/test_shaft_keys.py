@@ -8,7 +8,9 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.summary import derived_quantities
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.rotor.shaft import ShaftDamping
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
@@ -120,3 +122,15 @@ def test_heading_of_a_pickup_is_told_or_its_messages_tell_it():
         'sensors.heading_deg: must be between -360 and 360 deg, got 400']
     assert refused('sensors={heading_deg: 30, orientation: use}') == [
         'sensors.heading_deg: must not stand beside orientation: use, which tells it, got 30']
+
+
+def test_seal_tells_below_which_frequency_it_feeds_whirl():
+    # k_c / c = 2 pi 20 rad/s at the end of the range, and none of it at rest.
+    cross = 1e3 * 2.0 * np.pi * 20.0
+    case = load(PAPER, [
+        'rotor.bearings.1={name: seal, position: 0.5, damping: {xx: 1e3, zz: 1e3}, stiffness: '
+        f'{{speed_rpm: [0, 9000], xx: [1e6, 1e6], zz: [1e6, 1e6], xz: [0, {-cross}], '
+        f'zx: [0, {cross}]}}}}'])
+    told = dict(derived_quantities(case, (RigidSoil(),)))
+    assert told['seal: alone it feeds whirl'].startswith(
+        'slower than 0.1333 to 20 Hz over the speed range, 0.133 times the speed at its end')

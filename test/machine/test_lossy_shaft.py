@@ -18,7 +18,7 @@ from rotorsoil_ros.rotor.coefficients import FrequencyTable, SpeedTable
 from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.shaft import Material, ShaftDamping, ShaftSection
 
-from machines import elastic_machine, springy_soils
+from machines import elastic_machine, springy_soils, STEEL
 from oracles.dense import dense_eigenvalues, dense_forced, dense_response
 
 DAMPING = ShaftDamping(viscous=8e-6, loss_factor=0.02, fixed_mass=1.5, fixed_stiffness=4e-6)
@@ -123,10 +123,10 @@ def test_work_of_the_unbalance_is_what_all_parts_take():
 NONE = ShaftDamping()
 
 
-def jeffcott(*, damping=NONE, drag=0.0, seal=None):
+def jeffcott(*, damping=NONE, drag=0.0, torque=0.0, seal=None):
     """Return a disc amid a weightless shaft on rigid bearings."""
     section = ShaftSection(LENGTH, (DIAMETER, DIAMETER), (0.0, 0.0), 4, WEIGHTLESS,
-                           damping=damping)
+                           damping=damping, torque=torque)
     bearings = [Bearing(name, place, None, 1e13 * np.eye(2), np.zeros((2, 2)))
                 for name, place in (('a', 0.0), ('b', LENGTH))]
     return CoupledModel(Rotor(0.5, (section,), (Disc('disc', 0.5 * LENGTH, MASS, 0.0, 0.0),),
@@ -196,3 +196,40 @@ def test_modes_of_a_table_over_frequency_are_where_its_own_frequency_says():
                    4.0 * NATURAL)
     found = campbell(jeffcott(seal=seal), np.array([100.0]), 2)
     np.testing.assert_allclose(found.omega, [[exact, exact]], rtol=1e-5)
+
+
+def test_what_is_not_looked_at_is_told():
+    # A torque feeds without bound, and a table over frequency says nothing beyond its ends.
+    light = jeffcott(torque=300.0, drag=2.0)
+    assert stability(light, (10.0, 2.0 * NATURAL)).untold_above == math.inf  # has one mode
+    [section] = light.rotor.shaft
+    heavy = replace(light.rotor, shaft=(replace(section, material=STEEL),))
+    twisted = stability(CoupledModel(heavy), (10.0, 2.0 * NATURAL))
+    assert twisted.untold_above == twisted.highest == pytest.approx(4.8 * 2.0 * NATURAL)
+    assert twisted.untold_why == 'the torque could feed one, and none was looked for'
+    skew = np.array([[0.0, -1e5], [1e5, 0.0]])
+    seal = Bearing('seal', 0.5 * LENGTH, None, FrequencyTable(
+        NATURAL * np.array([0.5, 1.5]), (skew, skew)), 10.0 * np.eye(2))
+    found = stability(jeffcott(seal=seal), (10.0, 2.0 * NATURAL))
+    assert (found.untold_below, found.untold_above) == (0.5 * NATURAL, 1.5 * NATURAL)
+    assert found.untold_why == 'tables of bearings end there'
+    assert found.instabilities[0].frequency == pytest.approx(NATURAL, rel=1e-3)
+
+
+def test_torque_that_nothing_damps_feeds_a_whirl_as_the_full_eigenproblem_says():
+    # Held at one end only, so that what both ends do does not cancel.
+    machine = loaded_machine(damping=NONE, torque=2e4, soils=springy_soils())
+    rotor = replace(machine.rotor, drag=0.0, bearings=tuple(
+        replace(one, damping=1e-3 * np.eye(2), stiffness=1e8 * np.eye(2),
+                inertia=np.zeros((2, 2)), pedestal=None, foundation=None)
+        for one in machine.rotor.bearings))
+    model = CoupledModel(rotor)
+    exact = dense_eigenvalues(model, 300.0, stiffness=np.zeros((0, 0)), damping=np.zeros((0, 0)))
+    grows = exact[(exact.real > 1e-6 * np.abs(exact)) & (exact.imag < 1000.0)]
+    found = stability(model, (300.0, 300.0 * (1.0 + 1e-9)))
+    assert len(grows)
+    worst = grows[np.argmax(grows.real / np.abs(grows))]
+    nearest = min(found.instabilities, key=lambda one: abs(one.frequency - worst.imag))
+    assert nearest.frequency == pytest.approx(worst.imag, rel=1e-6)
+    assert nearest.damping_ratio == pytest.approx(-worst.real / abs(worst), rel=1e-4)
+    assert nearest.feeds[0].cause == 'torque'

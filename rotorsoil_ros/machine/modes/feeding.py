@@ -22,6 +22,10 @@ _ROUND_OFF = 1e-12
 # The soil is passive: what seems to give more than this of all power is a slip of its fit.
 _ARTEFACT = 1e-3
 
+# A torque, and the cross terms of a seal's mass, may feed modes of any frequency: they are looked
+# for up to so many times the highest speed.
+BOUNDLESS = 4.0
+
 # Share of the largest 1 / omega^2 below which a mode of the mesh has no mass.
 _MASSLESS = 1e-13
 
@@ -86,8 +90,8 @@ def highest_fed(model: CoupledModel, span: tuple[float, float]) -> float:
     for stiffness, damping, inertia in _of_everything(model, span):
         lowest = damping.lowest_eigenvalue
         gives = stiffness.skew + max(-stiffness.lowest_eigenvalue, 0.0)
-        if inertia.skew > 0.0 or inertia.lowest_eigenvalue < 0.0:
-            return math.inf
+        if _gives(inertia):
+            highest = max(highest, BOUNDLESS * span[1])
         if gives > 0.0 or lowest < 0.0:
             highest = max(highest, gives / lowest if lowest > 0.0 else math.inf)
     return highest
@@ -99,10 +103,23 @@ def _of_shaft(model: CoupledModel, fastest_speed: float) -> float:
     if losses is None:
         return 0.0
     if losses.torsion.any():
-        return math.inf
+        return BOUNDLESS * fastest_speed
     # Material feeds a whirl that is slower than the rotor; it grows by its loss factor at most.
     return (1.0 + float(losses.is_hysteretic)) * fastest_speed * bool(
         losses.viscous.any() or losses.is_hysteretic)
+
+
+def _gives(inertia: _Range) -> bool:
+    return inertia.skew > 0.0 or inertia.lowest_eigenvalue < 0.0
+
+
+def boundless(model: CoupledModel, span: tuple[float, float]) -> str:
+    """Return what may feed a mode of any frequency; nothing where all of it is bounded."""
+    losses = model.rotor.losses
+    if losses is not None and losses.torsion.any():
+        return 'the torque'
+    heavy = any(_gives(inertia) for _, _, inertia in _of_everything(model, span))
+    return 'the mass of a seal' if heavy else ''
 
 
 def fastest(model: CoupledModel) -> float:

@@ -78,9 +78,11 @@ class Stability:
     highest : float
         Frequency up to which a mode could grow and was looked for [rad/s]; 0 where nothing gives
         energy, so that none can.
-    untold_above : float
-        Frequency above which a mode could grow but the support is not known [rad/s]; infinite
-        where everything is known.
+    untold_above, untold_below : float
+        Frequencies above and below which a mode could grow but is not known [rad/s]; infinite and
+        zero where everything is known.
+    untold_why : str
+        Why not above; below it is that tables of bearings begin there.
     doubt : str
         Why nothing is known; empty if it is.
 
@@ -91,6 +93,8 @@ class Stability:
     highest: float
     untold_above: float = math.inf
     doubt: str = ''
+    untold_below: float = 0.0
+    untold_why: str = ''
 
     def to_json(self) -> str:
         """Return everything as one line of text."""
@@ -166,9 +170,25 @@ def stability(model: CoupledModel, span: tuple[float, float]) -> Stability:
         pencil = Pencil.up_to(model, wanted)
         samples = followed(pencil, first_speeds(model, (low, high)))
         found = list(_instabilities(pencil, samples))
-    known = pencil.solver.span[1]
+    above, why = _untold(model, pencil, (low, high), bound, wanted)
     return Stability((low, high), tuple(sorted(found, key=lambda one: (one.low, one.frequency))),
-                     min(wanted, known), known if known < wanted / _ABOVE else math.inf)
+                     min(wanted, pencil.solver.span[1]), above,
+                     untold_below=max(model.bearings.frequency_range[0], 0.0), untold_why=why)
+
+
+def _untold(
+    model: CoupledModel, pencil: Pencil, span: tuple[float, float], bound: float, wanted: float,
+) -> tuple[float, str]:
+    """Return above which frequency a mode may grow unseen [rad/s], and why."""
+    known = pencil.solver.span[1]
+    if known < wanted / _ABOVE:
+        return known, ('tables of bearings end there'
+                       if known == model.bearings.frequency_range[1] else
+                       'the support is not known there, and a bearing could feed one')
+    feed = feeding.boundless(model, span)
+    if feed and wanted == _ABOVE * bound:
+        return known, f'{feed} could feed one, and none was looked for'
+    return math.inf, ''
 
 
 def _instabilities(pencil: Pencil, samples: list[Vibrations]) -> Iterator[Instability]:

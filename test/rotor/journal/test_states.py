@@ -133,7 +133,8 @@ def loads_of(places, *, diameter=0.1, discs=(), heights=(0.0, 0.0, 0.0), sinks=(
     rotor = uniform_rotor(length=2.0, diameter=diameter, elements=40, material=STEEL, discs=discs,
                           bearings=[bearing(f'b{index}', place, stiffness=1e8, foundation=None)
                                     for index, place in enumerate(places)])
-    found = static_loads(rotor, compliance=np.diag(sinks), alignment=np.array(heights))
+    found = static_loads(rotor, compliance=np.diag(sinks) if np.ndim(sinks) == 1 else sinks,
+                         alignment=np.array(heights))
     return rotor, found
 
 
@@ -150,6 +151,24 @@ def test_slender_beam_on_three_supports():
     rotor, found = loads_of((0.0, 1.0, 2.0), diameter=0.01)
     np.testing.assert_allclose(16.0 * found / (rotor.mass * GRAVITY), [3.0, 10.0, 3.0],
                                rtol=1e-4)
+
+
+def test_one_block_below_all_bearings_moves_no_weight():
+    # It settles and tilts as a whole: its bearings stay on a straight line.
+    wheel, along = [Disc('wheel', 0.5, 20.0, 0.1, 0.2)], np.array([-0.7, 0.3, 1.3])
+    _, firm = loads_of((0.0, 1.0, 2.0), discs=wheel)
+    _, settled = loads_of((0.0, 1.0, 2.0), discs=wheel,
+                          sinks=1e-8 * (np.ones((3, 3)) + np.outer(along, along)))
+    np.testing.assert_allclose(settled, firm, rtol=1e-8)
+
+
+@pytest.mark.parametrize('stiffness, most', [(4e8, 0.023), (1e8, 0.086), (3e7, 0.24)])
+def test_blocks_of_their_own_move_weight_by_what_they_settle(stiffness, most):
+    # The figures of the theory manual: largest change of a load of 307, 890, 209 N.
+    wheel = [Disc('wheel', 0.5, 20.0, 0.1, 0.2)]
+    _, firm = loads_of((0.0, 1.0, 2.0), discs=wheel)
+    _, settled = loads_of((0.0, 1.0, 2.0), discs=wheel, sinks=(1.0 / stiffness,) * 3)
+    assert np.abs(settled / firm - 1.0).max() == pytest.approx(most, rel=0.02)
 
 
 def test_low_bearing_gives_its_load_to_its_neighbours():
