@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 HERE = Path(__file__).parent
-ASIDE = {'ross_rotor'}  # a part of `rotor`, for another interpreter
+ASIDE = {'ross_rotor', 'ross_random'}  # parts of others, for another interpreter
 
 
 def main() -> int:
