@@ -1,13 +1,13 @@
 """What can be said of a case before anything runs: derived quantities, and what looks odd."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 import itertools
 import math
 
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.design.bearings import of_bearings, of_film, of_journal, of_seals
 from rotorsoil_ros.case.design.ground import (
     band_contents,
     is_embedded,
@@ -19,7 +19,6 @@ from rotorsoil_ros.case.design.ground import (
 )
 from rotorsoil_ros.case.design.rigidity import bending_told
 from rotorsoil_ros.case.flexible.words import bodies_told, of_bodies
-from rotorsoil_ros.case.journal_entries import Journal
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
@@ -34,8 +33,7 @@ from rotorsoil_ros.ground.soil import (
 )
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
-from rotorsoil_ros.rotor.coefficients import Coefficients, values as values_of
-from rotorsoil_ros.units import GRAVITY, rad_s_to_hz, rad_s_to_rpm, Units
+from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, Units
 
 # Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
 # quarter.
@@ -44,15 +42,8 @@ _LARGEST_A0 = 6.0
 _LARGEST_A0_INCOMPRESSIBLE = 2.0
 _LARGEST_POISSON_RATIO = 0.45
 
-# A film: load over length times diameter [Pa], Reynolds numbers above which it has vortices (times
-# the root of radius over clearance) and is turbulent, eccentricity below which it is about to
-# whirl, and the share of a threshold up to which machines run.
-_HEAVIEST = 2.5e6
-_VORTICES, _TURBULENT = 41.0, 1000.0
-_LIGHTEST, _OF_THRESHOLD = 0.05, 0.8
-
-# Cross terms that differ by less than this share of all coefficients are symmetric.
-_SYMMETRIC = 1e-12
+# The share of a threshold up to which machines run.
+_OF_THRESHOLD = 0.8
 
 # Of the shaft's length: beyond, slopes are no longer small and no linear beam holds.
 _SURVIVED = 0.05
@@ -103,8 +94,8 @@ def derived_quantities(
     yield from bodies_told(case)
     yield from of_site(case, soil_models)
     for journal in case.journals:
-        yield from _of_journal(case, journal)
-    yield from _of_seals(case)
+        yield from of_journal(case, journal)
+    yield from of_seals(case)
     if band_contents(case):
         yield 'edges of the band hold', band_contents(case)
 
@@ -138,57 +129,6 @@ def _of_foundation(
         yield f'{name}: {where} stiffness {dof}', stiffness
 
 
-def _of_journal(case: Case, journal: Journal) -> Iterator[tuple[str, str]]:
-    """Yield where the journal floats at both ends of the speed range, and what that takes."""
-    name, ends = journal.name, journal.at(np.array(case.speed_range))
-    across, up = ends.load.tolist()
-    yield f'{name}: load on the journal', (
-        f'{ends.carried:.4g} N ({across:.4g} across, {up:.4g} up), '
-        f'{1e-6 * ends.specific_load:.3g} MPa of its length and diameter')
-    if journal.oil is not None:
-        colder, warmer = (replace(journal.oil, temperature=journal.oil.temperature + change)
-                          .viscosity / journal.oil.viscosity for change in (-10.0, 10.0))
-        yield f'{name}: oil', (
-            f'ISO VG {journal.oil.grade} at {journal.oil.temperature:g} deg C, '
-            f'{1e3 * journal.oil.viscosity:.4g} mPa s; 10 K colder or warmer make '
-            f'{colder:.2f} or {warmer:.2f} of it')
-    for what, values, unit in (
-            ('Sommerfeld number', ends.sommerfeld, ''), ('eccentricity', ends.eccentricity, ''),
-            ('attitude', np.degrees(ends.attitude), ' deg'),
-            ('least film', 1e6 * ends.least, ' um'), ('loss at least', ends.loss, ' W')):
-        slow, fast = values.tolist()
-        yield f'{name}: {what}', f'{slow:.4g} to {fast:.4g}{unit} over the speed range'
-    if ends.bearing.kind == 'tilting_pad':
-        yield f'{name}: pads', ('follow vibration of the speed itself; to modes of another '
-                                'frequency they are somewhat stiffer or softer')
-    else:
-        threshold = journal.states.rigid_threshold(ends.carried / GRAVITY)
-        yield f'{name}: a rigid rotor of its load', (
-            f'whirls from {rad_s_to_rpm(threshold):.5g} rpm on (textbook)'
-            if threshold < math.inf else
-            f'whirls nowhere up to {rad_s_to_rpm(float(journal.states.speed[-1])):.5g} rpm '
-            '(textbook)')
-
-
-def _of_seals(case: Case) -> Iterator[tuple[str, str]]:
-    """Yield below which frequency cross-coupling outdoes the damping of bearings and seals."""
-    films = {journal.name for journal in case.journals}
-    speed = np.array(case.speed_range)
-    for bearing in case.rotor.bearings:
-        if bearing.name in films:
-            continue
-        stiffness, damping, _ = bearing.coefficients(speed, speed)
-        skew = 0.5 * np.abs(stiffness[:, 1, 0] - stiffness[:, 0, 1])
-        direct = 0.5 * np.trace(damping, axis1=1, axis2=2)
-        if np.any(skew > _SYMMETRIC * np.abs(stiffness).max()):
-            with np.errstate(divide='ignore'):
-                slow, fast = (skew / direct).tolist()
-            yield f'{bearing.name}: alone it feeds whirl', (
-                f'slower than {rad_s_to_hz(slow):.4g} to {rad_s_to_hz(fast):.4g} Hz over the '
-                f'speed range, {fast / speed[1]:.3g} times the speed at its end (textbook, cross '
-                'stiffness over damping)')
-
-
 def a0(soil: Soil, foundation: Foundation, omega: float) -> float:
     """Return the dimensionless frequency of a block, omega b / c_s or omega r0 / c_s."""
     return omega * foundation.contact.characteristic_length / soil.shear_wave_speed
@@ -211,9 +151,9 @@ def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[s
         if disc.polar_inertia > 2.0 * disc.diametral_inertia:
             yield (f'{disc.name}: polar inertia {disc.polar_inertia:g} kg m^2 is more than twice '
                    f'the diametral {disc.diametral_inertia:g} kg m^2, which no body has')
-    yield from _of_bearings(case)
+    yield from of_bearings(case)
     for journal in case.journals:
-        yield from _of_film(case, journal)
+        yield from of_film(case, journal)
     yield from of_neighbours(case)
     yield from of_shapes(case, shapes)
     yield from of_bodies(case)
@@ -226,31 +166,6 @@ def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[s
             yield from _of_soil(case, case.soil, foundation)
 
 
-def _of_film(case: Case, journal: Journal) -> Iterator[str]:
-    """Yield where a film is thin, heavily loaded, turbulent or about to whirl."""
-    name, bearing, states = journal.name, journal.states.bearing, journal.states
-    low, high = case.speed_range
-    thin = states.thinner(journal.least_film)
-    if thin > low:
-        yield (f'{name}: below {rad_s_to_rpm(thin):.4g} rpm the film is thinner than '
-               f'{1e6 * journal.least_film:g} um: friction is mixed and coefficients are not '
-               'those of a film')
-    if states.specific_load > _HEAVIEST:
-        yield (f'{name}: carries {1e-6 * states.specific_load:.3g} MPa of its length and '
-               f'diameter, more than {1e-6 * _HEAVIEST:g} MPa')
-    reynolds = journal.viscosity.density * journal.at(np.array([high])).reynolds[0]
-    vortices = _VORTICES * math.sqrt(bearing.radius / bearing.radial_clearance)
-    if reynolds > min(vortices, _TURBULENT):
-        what = ('is turbulent: its coefficients are larger than those of a laminar one'
-                if reynolds > _TURBULENT else 'has vortices')
-        yield (f'{name}: at {rad_s_to_rpm(high):g} rpm the film has a Reynolds number of '
-               f'{reynolds:.4g} (limit {min(vortices, _TURBULENT):.4g}) and {what}')
-    light = np.flatnonzero((states.eccentricity < _LIGHTEST) & (states.speed <= high))
-    if bearing.kind != 'tilting_pad' and len(light):
-        yield (f'{name}: from {rad_s_to_rpm(float(states.speed[light].min())):.4g} rpm on the '
-               f'eccentricity is below {_LIGHTEST:g}: so lightly loaded a film is about to whirl')
-
-
 def near_threshold(case: Case, beyond: Stability) -> Iterator[str]:
     """Yield which mode begins to whirl too near above the speed range."""
     high = case.speed_range[1]
@@ -260,33 +175,6 @@ def near_threshold(case: Case, beyond: Stability) -> Iterator[str]:
                    f'rpm, from which on {one.name} grows, fed by '
                    + ' and '.join(feed.name for feed in one.feeds)
                    + f'; at most {_OF_THRESHOLD:.0%} are usual')
-
-
-def _of_bearings(case: Case) -> Iterator[str]:
-    """Yield where a bearing or a pedestal gives energy or pushes by itself."""
-    films = {journal.name for journal in case.journals}
-    for index, bearing in enumerate(case.rotor.bearings):
-        # Films push across by nature: what comes of it is told by the stability.
-        parts = [] if bearing.name in films else [('', bearing.stiffness, bearing.damping)]
-        if bearing.pedestal is not None:
-            parts.append(('pedestal.', bearing.pedestal.stiffness, bearing.pedestal.damping))
-        for place, *matrices in parts:
-            for name, unit, matrix in zip(('stiffness', 'damping'), ('N/m', 'N s/m'), matrices,
-                                          strict=True):
-                least = _least(matrix)
-                if least < 0.0:
-                    yield (f'rotor.bearings.{index}.{place}{name}: of {bearing.name} is negative '
-                           f'in some direction, {least:.4g} {unit}: '
-                           + ('it feeds vibration' if name == 'damping' else 'it pushes away'))
-
-
-def _least(matrix: Coefficients) -> float:
-    """Return the smallest eigenvalue of the symmetric part, over all points of a table."""
-    given = values_of(matrix)
-    symmetric = 0.5 * (given + given.swapaxes(-2, -1))
-    least = float(np.linalg.eigvalsh(symmetric).min())
-    # Round-off of a matrix that is just not negative is none.
-    return least if least < -1e-12 * float(np.abs(given).max()) else 0.0
 
 
 def unstable(found: Stability) -> Iterator[str]:
