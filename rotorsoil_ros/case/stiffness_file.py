@@ -12,6 +12,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.ground.branch_points import branch_points
 from rotorsoil_ros.ground.table import ComplianceTable, PASSIVITY, RECIPROCITY
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz
 
@@ -28,6 +29,9 @@ _PLACES = 8
 
 # Rows that make a piece of a curve between two cut-offs: a cubic of its own, and one to spare.
 _ROWS_OF_A_PIECE = 4
+
+# A branch point so near to a place where the curve is cut is the same.
+_ONE_CUT = 0.05
 
 # Of a frequency: 1 Hz and 60 rpm differ in the last digit.
 _ROUND_OFF = 1e-12
@@ -51,7 +55,8 @@ def read(
     text : str or None
         What the file says, where that is known already; the path then only names it.
     cut_offs_hz : sequence of float
-        Where waves of a layer begin to travel [Hz]; each is at the nearest row.
+        Where waves of a layer begin to travel [Hz]; each is at the nearest row. They are looked
+        for where none is given.
 
     Raises
     ------
@@ -74,7 +79,8 @@ def read(
         compliance[np.ix_(np.arange(len(omega)), free, free)] = np.linalg.solve(part, unit)
         # Solving leaves round-off between ij and ji.
         whole = ComplianceTable(omega, 0.5 * (compliance + compliance.swapaxes(1, 2)))
-        return _passive_curve(path, _cut(whole, cut_offs_hz), free)
+        found = _passive_curve(path, _cut(whole, cut_offs_hz), free)
+        return found if cut_offs_hz else _with_branch_points(found)
     except InputError:
         raise
     except np.linalg.LinAlgError as error:
@@ -238,6 +244,14 @@ def _passive_curve(path: Path, table: ComplianceTable, free: IntArray) -> Compli
                 f'{len(table.omega)} frequencies: between {first:.6g} and {last:.6g} Hz the '
                 'ground would give energy; add frequencies there, or mend the jump')
         table = best
+
+
+def _with_branch_points(table: ComplianceTable) -> ComplianceTable:
+    """Return a table that knows where waves of a layer begin to travel, as its rows show it."""
+    cuts = table.omega[list(table.cut_offs)]
+    found = branch_points(table.omega, table.values)
+    apart = np.abs(found[:, None] / cuts - 1.0).min(axis=1, initial=np.inf) > _ONE_CUT
+    return replace(table, branch_points=tuple(found[apart].tolist()))
 
 
 def _cut(table: ComplianceTable, cut_offs_hz: Sequence[float]) -> ComplianceTable:

@@ -64,6 +64,8 @@ class Continuation:
         What was fitted, over the size.
     within : tuple of two floats
         As in `of`.
+    blur : float
+        As in `of`.
 
     """
 
@@ -75,6 +77,7 @@ class Continuation:
     missed: float
     samples: tuple[FloatArray, ComplexArray]
     within: tuple[float, float]
+    blur: float
 
     @classmethod
     def of(
@@ -82,6 +85,7 @@ class Continuation:
         size: FloatArray | None = None,
         other: Callable[[FloatArray], ComplexArray] | None = None,
         within: tuple[float, float] = (-np.inf, np.inf),
+        span: tuple[float, float] | None = None, blur: float = 0.0,
     ) -> 'Continuation':
         """
         Fit a function.
@@ -98,6 +102,10 @@ class Continuation:
             A second opinion on the function, in place of its own every other sample.
         within : tuple of two floats
             Frequencies between which it has to stand for something passive [rad/s].
+        span : tuple of two floats, optional
+            Where the function is known, if that is farther than its samples [rad/s].
+        blur : float
+            How far off the ends of the span may be [rad/s].
 
         """
         values = known(omega)
@@ -107,7 +115,8 @@ class Continuation:
         second = values[::2] if other is None else other(omega[::2]) / (size[:, None] * size)
         groups = _coupled(values)
         fit = cls(_fits(groups, omega, values, within), _fits(groups, omega[::2], second, within),
-                  size, None, (float(omega[0]), float(omega[-1])), 0.0, (omega, values), within)
+                  size, None, span or (float(omega[0]), float(omega[-1])), 0.0, (omega, values),
+                  within, blur)
         missed = float(np.abs(fit(omega.astype(complex)) - values).max(initial=0.0))
         return replace(fit, known=known, missed=missed) if missed > _EXACT else fit
 

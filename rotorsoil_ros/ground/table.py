@@ -33,6 +33,8 @@ class ComplianceTable:
 
     cut_offs : tuple of int
         Rows, rising, at which waves of a layer begin to travel: no smooth curve leads over them.
+    branch_points : tuple of float
+        Other frequencies, rising, at which they do so but softly, as losses make it [rad/s].
 
     Notes
     -----
@@ -44,6 +46,7 @@ class ComplianceTable:
     omega: FloatArray
     values: ComplexArray
     cut_offs: tuple[int, ...] = ()
+    branch_points: tuple[float, ...] = ()
     _splines: 'tuple[CubicSpline, ...]' = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -58,7 +61,11 @@ class ComplianceTable:
 
     @property
     def singular(self) -> FloatArray:
-        """Frequencies of the cut-offs, rising [rad/s]."""
+        """Frequencies at which waves of a layer begin to travel, rising [rad/s]."""
+        return np.sort(np.append(self._cuts, self.branch_points))
+
+    @property
+    def _cuts(self) -> FloatArray:
         return self.omega[list(self.cut_offs)]
 
     def compliance(self, omega: FloatArray) -> ComplexArray:
@@ -91,7 +98,7 @@ class ComplianceTable:
             whole: ComplexArray = self._splines[0](omega)
             return whole
         values = np.empty((*omega.shape, 6, 6), dtype=complex)
-        piece = np.searchsorted(self.singular, omega, side='right')
+        piece = np.searchsorted(self._cuts, omega, side='right')
         for index, spline in enumerate(self._splines):
             values[piece == index] = spline(omega[piece == index])
         return values

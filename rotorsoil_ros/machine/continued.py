@@ -10,11 +10,17 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.continuation import Continuation, typical_size
 from rotorsoil_ros.ground.soil import second_opinion_of, singular_of
+from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.support import Support
 
 # Samples from which the compliance is continued, and those of a piece between branch points.
 _SAMPLES = 120
 _PIECE_SAMPLES = 48
+
+# Rows of a table that a piece is fitted to in place of these, at least; and how far off a branch
+# point is that was found in a table, at least, of itself.
+_LEAST_ROWS = 8
+_BLURRED = 0.003
 
 # A piece is longer than this share of the highest frequency.
 _NO_PIECE = 1e-6
@@ -64,9 +70,36 @@ def continued_by_pieces(
     edges = edges[np.diff(edges, prepend=-math.inf) > _NO_PIECE * high]
     edges[-1] = high
     along = 0.5 * (1.0 - np.cos(np.pi * np.arange(_PIECE_SAMPLES) / (_PIECE_SAMPLES - 1)))
-    samples = [left + (right - left) * along for left, right in pairwise(edges.tolist())
-               if right - left > _NARROW * right]
+    ends = [pair for pair in pairwise(edges.tolist()) if pair[1] - pair[0] > _NARROW * pair[1]]
+    rows = _rows(support)
+    samples = [_sampled(rows, pair, along) for pair in ends]
     size = typical_size(support.motion_compliance(np.concatenate(samples)))
-    return tuple(Continuation.of(
-        omega, support.motion_compliance, size, _other(support),
-        (float(omega[0]), float(omega[-1]))) for omega in samples)
+    return tuple(
+        Continuation.of(omega, support.motion_compliance, size, _other(support), within, within,
+                        _blur(rows, within))
+        for omega, within in zip(samples, ends, strict=True))
+
+
+def _rows(support: Support) -> FloatArray:
+    """Return the frequencies of the tables below the blocks, rising [rad/s]."""
+    return np.unique(np.concatenate([np.zeros(0), *(
+        soil.omega for soil in support.soil_models if isinstance(soil, ComplianceTable))]))
+
+
+def _sampled(rows: FloatArray, ends: tuple[float, float], along: FloatArray) -> FloatArray:
+    """
+    Return where a piece is sampled: at the rows of a table, if it has enough of them there.
+
+    A smooth curve through rows on both sides of a branch point belongs to neither.
+    """
+    left, right = ends
+    inside = rows[(rows >= left) & (rows <= right)]
+    return inside if len(inside) >= _LEAST_ROWS else left + (right - left) * along
+
+
+def _blur(rows: FloatArray, ends: tuple[float, float]) -> float:
+    """Return how far the rows of a table leave open where a piece ends; 0 without one."""
+    if not rows.size:
+        return 0.0
+    around = np.clip(np.searchsorted(rows, ends), 1, len(rows) - 1)
+    return max(0.5 * float(np.diff(rows)[around - 1].max()), _BLURRED * ends[1])

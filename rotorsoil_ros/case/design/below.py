@@ -98,5 +98,5 @@ def identity(model: SoilModel) -> object:
     if isinstance(model, LayeredSiteModel):
         return ['site on layers', model.ground, model.site, key_of(model)]
     if isinstance(model, ComplianceTable):
-        return ['table', model.omega, model.values, *model.cut_offs]
+        return ['table', model.omega, model.values, *model.cut_offs, *model.branch_points]
     return model

@@ -258,14 +258,21 @@ class SpectrumSolver:
         turning = np.maximum(speed, _CREEP * self.basis.mass.max() ** -0.5)
         whirls = {lag: self.basis.whirls(turning, lag)
                   for lag in {zone.lag for zone in self.zones}}
-        return _merged([self._solve_zone(speed, whirls[zone.lag], zone, count + spare)
-                        for zone in self.zones], count)
+        parts, strays = zip(*(self._solve_zone(speed, whirls[zone.lag], zone, count + spare)
+                              for zone in self.zones), strict=True)
+        found, astray = _merged(list(parts), count), np.concatenate(strays, axis=1)
+        # What another zone tells there, as one beside it may too, is not lost.
+        blur = max(zone.compliance.blur for zone in self.zones)
+        gap = np.abs(astray[:, :, None] - found.frequency.real[:, None])
+        told = np.fmin.reduce(gap, axis=2, initial=np.inf) <= blur
+        lost = np.where(told, np.inf, astray).min(axis=1, initial=np.inf)
+        return replace(found, untold=np.minimum(found.untold, lost))
 
     def _solve_zone(
         self, speed: FloatArray, whirls: Whirls,
         zone: Zone, count: int,
-    ) -> Spectrum:
-        """Return the vibrations whose frequency lies in a zone."""
+    ) -> tuple[Spectrum, FloatArray]:
+        """Return the vibrations whose frequency lies in a zone, and those just beyond it."""
         for reach in _REACHES:
             vibration = self._at(speed, whirls, zone, reach)
             frequency, vector, sound, untold = vibration.solve(count)
@@ -278,7 +285,7 @@ class SpectrumSolver:
         known = (frequency.real >= low[:, None]) & (frequency.real <= high[:, None])
         untold = np.where((untold >= low) & (untold <= high), untold, np.inf)
         return self._spectrum(vibration, whirls[1], np.where(known, frequency, np.nan), vector,
-                              untold)
+                              untold), zone.astray(frequency, low, high)
 
     def _spectrum(
         self, vibration: FreeVibration, amplitude: AnyArray, frequency: ComplexArray,

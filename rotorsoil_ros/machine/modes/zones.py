@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.continuation import Continuation
+from rotorsoil_ros.machine.modes.eigen import LIGHT
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,20 @@ class Zone:
         low, high = (np.full(len(speed), end) for end in span)
         return (np.maximum(low, speed) if self.lag > 0.0 else low,
                 np.minimum(high, speed) if self.lag < 0.0 else high)
+
+
+    def astray(
+        self, frequency: ComplexArray, low: FloatArray, high: FloatArray,
+    ) -> FloatArray:
+        """
+        Return which light vibrations of (n, p) lie just beyond ends (n,), else inf.
+
+        Where a table leaves open where a zone ends, they may be of this zone all the same.
+        """
+        beyond = np.maximum(low[:, None] - frequency.real, frequency.real - high[:, None])
+        light = frequency.imag < LIGHT * np.abs(frequency)
+        found = light & (beyond > 0.0) & (beyond <= self.compliance.blur)
+        return np.where(found, frequency.real, np.inf)
 
 
 def zones_of(

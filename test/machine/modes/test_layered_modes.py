@@ -1,17 +1,22 @@
 """Modes on ground with cut-offs, against the compliance solved at complex frequencies."""
 
+from contextlib import suppress
+from dataclasses import replace
 import math
 
 import numpy as np
 import pytest
 from scipy.optimize import newton
 
+from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.branch_points import branch_points
 from rotorsoil_ros.ground.layers.cylinder import CylinderInWaves, HEAVE, RigidCylinder, SWAY
 from rotorsoil_ros.ground.layers.line import LineMesh, VerticalLine
 from rotorsoil_ros.ground.layers.model import ThinLayerModel
 from rotorsoil_ros.ground.layers.profile import Layer, LayeredSoil, SURFACE
 from rotorsoil_ros.ground.layers.waves import Waves
 from rotorsoil_ros.ground.soil import Circle, Soil
+from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.campbell import campbell
@@ -132,6 +137,36 @@ def test_natural_frequencies_lie_in_the_pieces_of_their_continuation(found):
     light = modes.damping_ratio[0] < 0.05
     expected = np.abs(modes.eigenvalue[0, light])[0]
     assert np.abs(frequency / expected - 1.0).min() < 5e-3
+
+
+def as_table(model, count):
+    """Return a machine whose ground is a table of so many rows of what it stands on."""
+    [soil] = model.soil_models
+    omega = np.linspace(3.0, 370.0, count)
+    values = soil.compliance(omega)
+    table = ComplianceTable(omega, values, (), tuple(branch_points(omega, values).tolist()))
+    return replace(model, soil_models=(table,))
+
+
+def light(found):
+    return np.array([(one.speed, one.damping_ratio) for one in found if one.damping_ratio < 0.1])
+
+
+def test_table_of_a_layer_on_rock_has_its_modes_or_says_what_it_leaves_open(found):
+    depth, model, _ = found
+    # Of 1.5 m up to just below the first cut-off: what lies on it no table tells.
+    span = (40.0, 230.0 if depth == 1.5 else 300.0)
+    expected = light(critical_speeds(model, span))
+    assert len(expected) >= 2
+    told = light(critical_speeds(as_table(model, 400), span))
+    # The table is a fit within 1e-4 itself; the damping of a mode just below a cut-off feels it.
+    np.testing.assert_allclose(told[:, 0], expected[:, 0], rtol=2e-3)
+    np.testing.assert_allclose(told[:, 1], expected[:, 1], rtol=0.05)
+    for count in (60, 25):
+        # An error where they leave a light mode open: never a mode less without a word.
+        with suppress(NotSolvedError):
+            rough = light(critical_speeds(as_table(model, count), span))
+            np.testing.assert_allclose(rough[:, 0], expected[:, 0], rtol=2e-2)
 
 
 def test_bearing_that_feeds_a_block_on_rock_is_found():
