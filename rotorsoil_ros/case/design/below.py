@@ -70,12 +70,16 @@ def _below(case: Case, index: int, contact: Contact, cache: Cache) -> SoilModel:
         embedment = case.embedments[index]
         return (EmbeddedConeModel(case.soil, contact, embedment) if embedment.depth else
                 ConeModel(case.soil, contact))
+    alone = Site.of((contact,), ((0.0, 0.0),)) if (
+        case.support.model == BOUNDARY_ELEMENTS) else None
     if case.ground is not None:
+        if alone is not None:
+            return layered_site_model(case.ground, alone, cache=cache,
+                                      speed_range=case.speed_range)
         return thin_layer_model(case.ground, contact, case.embedments[index], cache=cache,
                                 speed_range=case.speed_range)
-    if case.support.model == BOUNDARY_ELEMENTS:
-        return boundary_element_model(case.soil, Site.of((contact,), ((0.0, 0.0),)), cache=cache,
-                                      speed_range=case.speed_range)
+    if alone is not None:
+        return boundary_element_model(case.soil, alone, cache=cache, speed_range=case.speed_range)
     return infinite_element_model(case.soil, contact, case.support.geometry, cache=cache,
                                   speed_range=case.speed_range)
 

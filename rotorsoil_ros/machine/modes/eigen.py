@@ -14,7 +14,7 @@ from rotorsoil_ros.rotor.whirl import ORBITS
 _CREEPING = 0.2
 
 # A vibration with less damping than this is felt: its amplification factor is above 2.5.
-LIGHT = 0.2
+FELT_BELOW = 0.2
 
 # Newton's iteration stops at this relative step, whose square is the error left.
 _CONVERGED = 1e-6
@@ -284,7 +284,7 @@ class FreeVibration:
         exists = np.isfinite(guess)
         frequency = np.where(exists, guess, self.highest)
         wanted: BoolArray = exists & self.compliance.agrees(frequency)
-        light = exists & ~wanted & (np.abs(frequency.imag) < LIGHT * np.abs(frequency))
+        light = exists & ~wanted & (np.abs(frequency.imag) < FELT_BELOW * np.abs(frequency))
         untold = np.where(light, frequency.real, np.inf).min(axis=1, initial=np.inf)
         vector[~wanted] = 1.0
         active: BoolArray = wanted.copy()
@@ -299,7 +299,7 @@ class FreeVibration:
         unsound = active | moved | _repeats(frequency, vector)
         if self.compliance.known is not None:
             # What a rough fit says far from the real axis may have no mode near its guess.
-            heavy = unsound & (guess.imag > LIGHT * np.abs(guess))
+            heavy = unsound & (guess.imag > FELT_BELOW * np.abs(guess))
             frequency = np.where(heavy, np.nan, frequency)
             unsound &= ~heavy
         return frequency, vector, np.asarray(~unsound.any(axis=1)), untold

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.continuation import Continuation
-from rotorsoil_ros.machine.modes.eigen import LIGHT
+from rotorsoil_ros.machine.modes.eigen import FELT_BELOW
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Zone:
         Where a table leaves open where a zone ends, they may be of this zone all the same.
         """
         beyond = np.maximum(low[:, None] - frequency.real, frequency.real - high[:, None])
-        light = frequency.imag < LIGHT * np.abs(frequency)
+        light = frequency.imag < FELT_BELOW * np.abs(frequency)
         found = light & (beyond > 0.0) & (beyond <= self.compliance.blur)
         return np.where(found, frequency.real, np.inf)
 
