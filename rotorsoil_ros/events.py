@@ -54,11 +54,26 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class Predicted:
-    """What a machine should do at each of n reported speeds: NaN where there is no answer."""
+    """
+    What a machine should do at each of n reported speeds: NaN where there is no answer.
+
+    Attributes
+    ----------
+    machine : str
+        Its name.
+    stamp_ns : (n,) int array
+        When [ns].
+    prediction : Prediction
+        With what the changes of the speed have struck.
+    steady : Prediction or None
+        As if each speed had been there for ever; None of a machine that is answered so.
+
+    """
 
     machine: str
     stamp_ns: IntArray
     prediction: Prediction
+    steady: Prediction | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,6 +243,7 @@ class Reason(StrEnum):
     SLOW_ROLL = 'slow roll, taken as runout'
     BELOW_NOISE = 'below noise'
     NOT_QUASI_STATIC = 'not quasi-static'
+    STILL_RINGS = 'may ring from before the beginning'
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,6 +111,8 @@ class Response:
         Transmitted force [N, N m], as in `Prediction`; NaN where a channel transmits none.
     stamp_ns : (n,) int array or None
         When, where the speeds are those of a profile [ns].
+    own_velocity : (n, c) complex array or None
+        Velocity, where something rings at a frequency of its own; None: i omega X.
 
     """
 
@@ -120,6 +122,7 @@ class Response:
     displacement: ComplexArray
     force: ComplexArray
     stamp_ns: IntArray | None = None
+    own_velocity: ComplexArray | None = None
 
     @classmethod
     def of(
@@ -128,7 +131,8 @@ class Response:
     ) -> 'Response':
         """Return what a model answered to its unbalance, labelled."""
         return cls(channels, prediction.speed, prediction.speed, prediction.displacement,
-                   prediction.force, stamp_ns)
+                   prediction.force, stamp_ns,
+                   None if prediction.ringing is None else prediction.velocity)
 
     def where(self, exists: BoolArray) -> 'Response':
         """Return the same with NaN where no steady response exists, (n,)."""
@@ -153,8 +157,10 @@ class Response:
 
         """
         columns = columns_of(self.channels, names)
+        own = None if self.own_velocity is None else self.own_velocity[:, columns]
         return replace(self, channels=tuple(self.channels[column] for column in columns),
-                       displacement=self.displacement[:, columns], force=self.force[:, columns])
+                       displacement=self.displacement[:, columns], force=self.force[:, columns],
+                       own_velocity=own)
 
     @property
     def units(self) -> dict[str, str]:
@@ -163,7 +169,9 @@ class Response:
 
     @property
     def velocity(self) -> ComplexArray:
-        """Velocity, i omega X, (n, c) [m/s, rad/s]."""
+        """Velocity, i omega X where nothing rings, (n, c) [m/s, rad/s]."""
+        if self.own_velocity is not None:
+            return self.own_velocity
         return 1j * self.omega[:, None] * self.displacement
 
     @property

@@ -144,7 +144,8 @@ def test_every_file_is_written_and_says_the_same(healthy):
     speed = np.array([float(row['speed_rad_s'])])
     exact = model.unbalance_response(speed, case.unbalance).displacement[
         0, model.channels.index(row['channel'])]
-    assert float(row['predicted_amplitude']) == pytest.approx(abs(exact), rel=1e-4)
+    # A slow coast-down: nearly what the machine does that has always turned so.
+    assert float(row['predicted_amplitude']) == pytest.approx(abs(exact), rel=0.01)
     assert float(row['band_low']) <= float(row['predicted_amplitude']) <= float(row['band_high'])
     assert row['used'] == '1'
 
@@ -256,7 +257,8 @@ def test_run_that_cannot_tell_is_refused(tmp_path):
 
 
 def test_runout_is_identified_as_a_constant_vector(tmp_path):
-    found = judged(write_vectors(tmp_path / 'log.mcap', offset=2e-6j))
+    # At so many constant speeds: what was measured is steady to the last digit.
+    found = judged(write_vectors(tmp_path / 'log.mcap', offset=2e-6j, seconds=11))
     known = identify_case(found, Wanted(planes=['wheel'], runout=True))
     assert known.columns[1:] == tuple(f'runout of {name}' for name in HOUSINGS)
     np.testing.assert_allclose(known.moment[1:], 2e-6j, rtol=1e-3)
@@ -309,31 +311,36 @@ def test_rotor_kit_is_shown_as_it_is(kit_log, tmp_path, capsys):
     assert channel['excluded']['not quasi-static'] > 150
     assert channel['share_inside_band'] is None
     assert 'was passed too fast to be as high and where it would be at constant speed' in said
+    # Nearly without damping the model rings on behind its own critical speed, and no peak of it
+    # stands out.
     [peak] = summary(tmp_path)['peaks']
-    measured, predicted = (peak[side]['speed_rad_s'] * 30.0 / np.pi
-                           for side in ('measured', 'predicted'))
-    assert predicted == pytest.approx(2024.0, abs=12.0)  # one revolution at this rate
-    assert 1550.0 < measured < 1700.0
-    assert peak['deviation'] < -0.15
+    assert peak['predicted'] is None
+    assert 1550.0 < peak['measured']['speed_rad_s'] * 30.0 / np.pi < 1700.0
     assert not peak['quasi_static']
+    assert 'the peak measured at 1665 rpm is not predicted' in said
 
 
 def test_rotor_kit_bearing_stiffness_is_identified(kit_log, tmp_path, capsys):
     arguments = ['compare', kit_log, KIT, '-o', str(tmp_path), '--plane', 'disc_1',
                  '--identify', 'rotor.bearings.*.stiffness']
-    main([*arguments, '--with-transients'])
+    case = tmp_path / 'identified.yaml'
+    main([*arguments, '--write-case', str(case)])
+    said = capsys.readouterr().out
+    # One stiffness in all directions is one mode, which cannot beat; the kit has two.
+    assert float(re.search(r'stiffness: factor (\S+)', said)[1]) == pytest.approx(0.064, rel=0.02)
+    assert 88.0 < float(re.search(r'explains (\S+) %', said)[1]) < 92.0
+    again = judged(kit_log, case)
+    [peak] = again.peaks
+    assert abs(peak.deviation) < 0.02
+    [points] = again.points
+    assert np.all(points.used)  # all 210, in a passage at p = 0.95
+    [failure] = again.failures
+    assert 'high, at most' in failure
+    main([*arguments, '--force', '--set', 'run_up=quasi_static'])
+    assert 'refused: the run cannot tell rotor.bearings.*.stiffness' in capsys.readouterr().out
+    main([*arguments, '--force', '--set', 'run_up=quasi_static', '--with-transients'])
     said = capsys.readouterr().out
     assert float(re.search(r'stiffness: factor (\S+)', said)[1]) == pytest.approx(0.077, rel=0.02)
-    assert 90.0 < float(re.search(r'explains (\S+) %', said)[1]) < 95.3  # two modes: 0.953
-    case = tmp_path / 'identified.yaml'
-    main([*arguments, '--with-transients', '--write-case', str(case), '--force'])
-    capsys.readouterr()
-    again = judged(kit_log, case)
-    # Where and how high is explained; but a passage this fast proves nothing.
-    assert again.failures == []
-    assert again.verdict == Verdict.UNDECIDED
-    main([*arguments, '--force'])
-    assert 'refused: the run cannot tell rotor.bearings.*.stiffness' in capsys.readouterr().out
 
 
 def test_log_of_an_answered_run_knows_its_case(kit_log, tmp_path, capsys):

@@ -1,5 +1,5 @@
 """
-Run a rotor up on the ROS graph, and draw what its twin answers.
+Run a rotor up on the ROS graph, at 300 rad/s^2, and draw what its twin answers: a run-up.
 
     rotorsoil_node --ros-args -p machines:="[paper_rotor]" -p paper_rotor.case:=paper_rotor &
     python examples/run_up/run_up.py run_up.png

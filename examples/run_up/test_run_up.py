@@ -18,8 +18,10 @@ def test_the_run_up_draws_what_the_machine_should_do(rotorsoil_twin, tmp_path):
     answered = [stamp for stamp in node.amplitudes
                 if table.speed_range[0] <= node.speeds[stamp] <= FASTEST]
     assert len(answered) > 100
-    exact = table.predictor(machine.case.unbalance).predict(
-        np.array([node.speeds[stamp] for stamp in answered]))
+    heard = sorted(node.amplitudes)
+    exact = machine.predict(rs.Profile('', np.array(heard), np.array(
+        [node.speeds[stamp] for stamp in heard])))
+    exact = exact.displacement[np.isin(exact.stamp_ns, answered)]
     np.testing.assert_allclose(
         [node.amplitudes[stamp] for stamp in answered],
-        np.abs(exact.displacement[:, table.channels.index(CHANNEL)]), rtol=1e-14)
+        np.abs(exact[:, table.channels.index(CHANNEL)]), rtol=1e-14)

@@ -23,7 +23,7 @@ from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.health import Health
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.rules import Judging
-from rotorsoil_ros.wire.messages import Encoder, Messenger, Records, Topics
+from rotorsoil_ros.wire.messages import Encoder, Messenger, moduli, Records, Topics
 from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
 
 
@@ -36,19 +36,15 @@ class LargestAnswer:
     ----------
     channel : Channel
         Which.
-    speed, amplitude : float
-        Of the rotor [rad/s], and of the displacement, zero-to-peak [m].
+    speed, amplitude, velocity : float
+        Of the rotor [rad/s]; of the displacement, zero-to-peak [m]; and of the channel [m/s rms].
 
     """
 
     channel: Channel
     speed: float
     amplitude: float
-
-    @property
-    def velocity(self) -> float:
-        """Velocity [m/s rms]."""
-        return self.speed * self.amplitude / math.sqrt(2.0)
+    velocity: float
 
 
 class Largest:
@@ -67,21 +63,24 @@ class Largest:
         """Take an event; whatever is no answer is nothing."""
         if not isinstance(event, Predicted):
             return
-        size = np.abs(event.prediction.displacement)
+        sizes, velocity = moduli(event.prediction)
+        size = sizes[:, 0]
         known = np.isfinite(size).all(axis=1)
         if not known.any():
             return
         speed, size = np.abs(event.prediction.speed[known]), size[known]
+        rms = np.abs(velocity[known]) / math.sqrt(2.0)
         self.speeds = (min(self.speeds[0], float(speed.min())),
                        max(self.speeds[1], float(speed.max())))
         row, column = divmod(int(np.where(self._moved, size, 0.0).argmax()), size.shape[1])
-        own = LargestAnswer(self._channels[column], float(speed[row]), float(size[row, column]))
+        own = LargestAnswer(self._channels[column], float(speed[row]), float(size[row, column]),
+                            float(rms[row, column]))
         if self.displacement is None or own.amplitude > self.displacement.amplitude:
             self.displacement = own
         for column in self._housings:
-            row = int((speed * size[:, column]).argmax())
+            row = int(rms[:, column].argmax())
             own = LargestAnswer(self._channels[column], float(speed[row]),
-                                float(size[row, column]))
+                                float(size[row, column]), float(rms[row, column]))
             before = self.housings.get(own.channel)
             if before is None or own.velocity > before.velocity:
                 self.housings[own.channel] = own

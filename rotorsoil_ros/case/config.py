@@ -87,6 +87,8 @@ class Case:
         Mean temperatures of the films for which there are tables besides [deg C].
     berth : Berth or None
         Where it stands among the machines of a plant; None alone.
+    run_up : str
+        Whether answers follow changes of the speed, `transient`, or not, `quasi_static`.
     cache_directory : Path or None
         Where the tables of their films lie; None is the usual one.
     content : mapping
@@ -115,6 +117,7 @@ class Case:
     journals: tuple[Journal, ...] = field(default=(), compare=False)
     oil_temperatures: tuple[float, ...] = ()
     berth: Berth | None = None
+    run_up: str = 'transient'
     cache_directory: Path | None = field(default=None, compare=False, repr=False)
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
@@ -135,8 +138,7 @@ class Case:
 
 
 # What the response table of a machine may take.
-_GIB = 1 << 30
-_LARGEST_TABLE = 2 * _GIB
+_GIB, _LARGEST_TABLE = 1 << 30, 2 << 30
 
 # Surface speed at which rho v^2 of steel is a twelfth of its modulus [m/s].
 _BURSTING = 1500.0
@@ -257,9 +259,8 @@ class _Builder:
         unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
         unbalance = unbalances.total()
         tables = None if speed_range is None else self._tables(speed_range)
-        journals = None
-        if rotor is not None and speed_range is not None:
-            journals = self._journals().journals(rotor, speed_range)
+        journals = (None if rotor is None or speed_range is None
+                    else self._journals().journals(rotor, speed_range))
         oils = faults.attempt(self._journals().oil_temperatures)
         uncertainty = faults.attempt(self._uncertainty)
         zones = faults.attempt(lambda: zones_of(faults))
@@ -282,8 +283,8 @@ class _Builder:
             rotor=floated(rotor, journals), unbalance=unbalance, couples=unbalances.couples(),
             speed_range=speed_range, ground_probes=probes, tables=tables,
             uncertainty=uncertainty, zones=zones, sensors=sensors, journals=journals,
-            oil_temperatures=oils, cache_directory=self.cache_directory, content=self.content,
-            files=self.files)
+            oil_temperatures=oils, run_up=entries.run_up, cache_directory=self.cache_directory,
+            content=self.content, files=self.files)
         if not faults.found:
             self._refuse_unreachable_soil(case)
         return case

@@ -19,6 +19,7 @@ from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.transient.state import Transient
 from rotorsoil_ros.machine.transmissibility import Transmissibility
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
@@ -317,10 +318,15 @@ class Machine(ModalAnswers):
         Returns
         -------
         Response
-            With the stamps of the profile; NaN where the table does not cover a speed.
+            With the stamps of the profile and what its changes of speed strike; NaN where the
+            table does not cover a speed.
 
         """
-        answered = self.table.predictor(self.case.unbalance).answer(profile.speed)
+        predictor = self.table.predictor(self.case.unbalance)
+        steady = predictor.answer(profile.speed)
+        told = np.where(predictor.covers(profile.speed), profile.speed, np.nan)
+        answered = predictor.moved(
+            steady, Transient(self.table.poles).follow(profile.stamp_ns, told))
         return Response.of(self.table.channels, answered, profile.stamp_ns)
 
     def description(self, name: str, unbalance: ComplexArray) -> Mapping[str, object]:

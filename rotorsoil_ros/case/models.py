@@ -42,6 +42,7 @@ from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.source import SourceModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 from rotorsoil_ros.machine.spread import Place, SoilSpread
+from rotorsoil_ros.machine.transient.poles import Poles
 
 # What a message holds of an answer, in a log that has to explain itself.
 UNITS = {
@@ -102,8 +103,15 @@ def stored_response_table(
     """Return the response table of a case if the cache holds it."""
     key = response_key(case, model)
     arrays = Cache(directory).load('response', key)
-    return None if arrays is None else ResponseTable.from_arrays(
-        arrays, model.channels, key=key)
+    return None if arrays is None else _followed(case, ResponseTable.from_arrays(
+        arrays, model.channels, key=key))
+
+
+def _followed(case: Case, table: ResponseTable) -> ResponseTable:
+    """Return a table that follows changes of the speed only if the case wants it."""
+    if case.run_up == 'transient':
+        return table
+    return replace(table, poles=Poles.none('run_up: quasi_static, as the case wants it'))
 
 
 def response_table(case: Case, model: CoupledModel, directory: Path) -> ResponseTable:
@@ -132,7 +140,7 @@ def response_table(case: Case, model: CoupledModel, directory: Path) -> Response
         table = replace(ResponseTable.build(model, case.speed_range),
                         key=response_key(case, model))
     Cache(directory).store('response', table.key, table.to_arrays())
-    return table
+    return _followed(case, table)
 
 
 def response_band(
@@ -259,6 +267,11 @@ def description(
         'unbalance': {
             disc: {'moment_kg_m': float(np.abs(value)), 'phase_rad': float(np.angle(value))}
             for disc, value in zip(table.planes, unbalance, strict=True)},
+        'run_up': 'quasi_static' if table.poles.doubt else 'transient',
+        'run_up_doubt': table.poles.doubt,
+        'free_vibrations': [{'decay_rad_s': [decay.real, decay.imag], 'slope': slope}
+                            for decay, slope in zip(table.poles.decay.tolist(),
+                                                    table.poles.slope.tolist(), strict=True)],
         'units': UNITS,
         # All that is needed to compare the log with the case again.
         'document': case.content, 'files': case.files,

@@ -286,6 +286,7 @@ class Common(Entry):
     uncertainty: Uncertainty | None = None
     zones: ZonesEntry | None = None
     sensors: SensorsEntry = Field(default_factory=SensorsEntry)
+    run_up: Literal['transient', 'quasi_static'] = 'transient'
     anti_alias: bool = False
 
 

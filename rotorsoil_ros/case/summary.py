@@ -33,6 +33,7 @@ from rotorsoil_ros.ground.soil import (
 )
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
+from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, Units
 
 # Cones beside rigorous solutions (theory manual, cones): beyond these they are off by more than a
@@ -229,6 +230,12 @@ def stability_doubts(found: Stability) -> Iterator[str]:
         if 0.0 < edge < math.inf:
             yield (f'whether a mode {which} {rad_s_to_hz(edge):.4g} Hz is stable is not known: '
                    f'{why}')
+
+
+def without_transients(case: Case, table: ResponseTable) -> Iterator[str]:
+    """Yield why answers do not follow changes of the speed although the case wants it."""
+    if table.poles.doubt and case.run_up == 'transient':
+        yield f'answers are steady, however fast the speed changes: {table.poles.doubt}'
 
 
 def undecided(case: Case, error: NotSolvedError) -> str:

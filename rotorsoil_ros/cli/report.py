@@ -28,6 +28,7 @@ from rotorsoil_ros.case.summary import (
     undecided,
     unstable,
     warnings,
+    without_transients,
 )
 from rotorsoil_ros.cli.arguments.options import SI
 from rotorsoil_ros.cli.plant.check import check_each, neighbour_warnings
@@ -87,7 +88,8 @@ def _check(arguments: Namespace, overrides: Sequence[str], units: Units) -> int:
     _print_table(_of_damping(case, model, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
-                         warnings(case, shapes), of_rigidity(case, model.soil_models),
+                         without_transients(case, table), warnings(case, shapes),
+                         of_rigidity(case, model.soil_models),
                          depth_remarks(case, model, directory),
                          neighbour_warnings(Machine(case, directory))):
         print(f'warning: {warning}')

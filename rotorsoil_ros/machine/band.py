@@ -85,6 +85,32 @@ class Envelope:
         return replace(self, low=np.where(inside, np.fmin(self.low, size), self.low),
                        high=np.where(inside, np.fmax(self.high, size), self.high))
 
+    def opened(self, steady: ComplexArray, moved: ComplexArray) -> 'Envelope':
+        """
+        Return the envelope of machines to which a changing speed does no more than to this one.
+
+        Parameters
+        ----------
+        steady, moved : (n, c) complex arrays
+            Displacement of the given machine, without and with what the change adds: on another
+            ground it adds as much, at another phase.
+
+        """
+        added = np.abs(moved - steady)
+        rows = added > 0.0
+        if not rows.any():
+            return self
+        known = rows & (added < self.low)
+        width = np.arcsin(np.divide(added, self.low, out=np.ones(added.shape), where=known))
+        turn = np.angle(moved * steady.conj())
+        behind = np.where(known, np.maximum(self.behind - turn - width, -math.pi), -math.pi)
+        ahead = np.where(known, np.minimum(self.ahead - turn + width, math.pi), math.pi)
+        rows &= np.isfinite(self.low)
+        return replace(self, low=np.where(rows, np.maximum(self.low - added, 0.0), self.low),
+                       high=np.where(rows, self.high + added, self.high),
+                       behind=np.where(rows, behind, self.behind),
+                       ahead=np.where(rows, ahead, self.ahead))
+
     def at(self, speed: FloatArray) -> 'Envelope':
         """Return the envelope between its speeds, NaN outside them."""
         edges, bounds = self._bounds

@@ -1,8 +1,8 @@
 """What the machine answers at any speed, without solving again."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 import math
 
 import numpy as np
@@ -69,8 +69,8 @@ class ResponseTable:
         Where a mode grows on its own: no piece is resolved there, as there is no steady response.
     key : str
         What identifies the computation in the cache; empty if it was not cached.
-    poles : Poles or None
-        Free vibrations that a changing speed strikes; None where nobody asks for them.
+    poles : Poles
+        Free vibrations that a changing speed strikes.
 
     """
 
@@ -81,7 +81,7 @@ class ResponseTable:
     accuracy: float
     stability: Stability
     key: str = ''
-    poles: Poles | None = None
+    poles: Poles = field(default_factory=partial(Poles.none, 'nobody has looked for them'))
 
     @classmethod
     def build(
@@ -176,7 +176,7 @@ class ResponseTable:
 
     def _strength(self, unbalance: ComplexArray) -> FloatArray:
         """Return what real and imaginary parts of deviations do, (2 k, 4 c)."""
-        if self.poles is None:
+        if not len(self.poles):
             return np.zeros((0, 4 * len(self.channels)))
         weighted = np.einsum('kpw,p->kw', self.poles.strength, unbalance)
         moving = len(self.channels)
@@ -217,7 +217,7 @@ class ResponseTable:
             'resolved': self.pieces.resolved, 'coefficients': self.pieces.coefficients,
             'accuracy': np.array(self.accuracy),
             'stability': np.array(self.stability.to_json()),
-            **({} if self.poles is None else self.poles.to_arrays()),
+            **self.poles.to_arrays(),
         }
 
     @classmethod
@@ -231,7 +231,7 @@ class ResponseTable:
             arrays['transmits_force'],
             Pieces(arrays['edges'], arrays['resolved'], arrays['coefficients']),
             float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])), key,
-            Poles.from_arrays(arrays) if 'pole_decay' in arrays else None)
+            Poles.from_arrays(arrays))
 
 
 def growth_of(model: CoupledModel, high: float) -> Stability:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.events import (
@@ -27,9 +27,10 @@ from rotorsoil_ros.events import (
 )
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.response import Predictor
-from rotorsoil_ros.monitor.criteria import answer, Criteria
+from rotorsoil_ros.machine.transient.state import Transient
+from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.monitor.inside import BandShare
-from rotorsoil_ros.monitor.quasistatic import Pace
+from rotorsoil_ros.monitor.quasistatic import Pace, Unsettled
 from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.monitor.suspicion import Suspicion
 from rotorsoil_ros.monitor.sweep import Sweeps
@@ -58,13 +59,13 @@ class Judge:
     """
 
     def __init__(
-        self, machine: str, predictor: Predictor, judging: Judging, *,
+        self, machine: str, predictor: Predictor, judging: Judging, *, transient: Transient,
         hindsight: Mapping[str, complex] | None = None,
     ) -> None:
         self.machine = machine
         self.history = History()
         self._judging = judging
-        self._predictor = predictor
+        self._predictor, self._transient = predictor, transient
         self._envelope: Envelope | None = None
         self._pairing = Pairing(self.history, tolerance_s=judging.rules.matching.tolerance)
         self.runout = Runout(judging.rules.matching.slow_roll_speed, hindsight)
@@ -88,17 +89,18 @@ class Judge:
         self._band_told = -REPEAT_NS, 0.0
         self.is_synthetic = False
 
-    def take_predictor(self, predictor: Predictor) -> None:
-        """Judge by another unbalance, for which the band is not known yet."""
-        self._predictor, self._envelope = predictor, None
+    def take_predictor(self, predictor: Predictor, transient: Transient) -> None:
+        """Judge by another unbalance or table, for which the band is not known yet."""
+        self._predictor, self._transient, self._envelope = predictor, transient, None
 
     def take_criteria(self, criteria: Criteria) -> None:
         """Judge by a band, resonances and natural speeds from now on."""
         self._envelope = criteria.envelope
         self._zones.natural = {axis: criteria.lowest_natural_speed(axis) for axis in ACROSS}
         self._sweeps.resonances = criteria.resonances
+        self._sweeps.are_followed = self._is_followed
         if self._pace is None or self._pace.resonances != criteria.resonances:
-            self._pace = Pace(self.history, criteria.resonances)
+            self._pace = Pace(self.history, criteria.resonances, self._unsettled)
         self._news.append(criteria)
 
     def on_speed(self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> bool:
@@ -113,8 +115,8 @@ class Judge:
         if self._envelope is not None:
             rows = list(self._band_rows(stamp_ns, speed))
             if rows:
-                band = self._envelope.at(speed[rows]).around(
-                    answer(self._predictor, speed[rows]))
+                steady, moved = self._answers(stamp_ns[rows], speed[rows])
+                band = self._envelope.at(speed[rows]).around(steady).opened(steady, moved)
                 yield Band(self.machine, stamp_ns[rows], speed[rows], band.low, band.high)
         yield from self._matched()
 
@@ -192,7 +194,7 @@ class Judge:
         self._zones.close(now_ns)
         now = self.history.last_speed
         if math.isfinite(now):
-            row = answer(self._predictor, np.array([now]))[0]
+            row = self._answers(np.array([self.history.last_ns]), np.array([now]))[1][0]
             self._zones.predict(
                 {name: now * abs(row[column]) / math.sqrt(2.0)
                  for column, name in enumerate(self._predictor.channels)
@@ -226,7 +228,8 @@ class Judge:
             compared.deviation, [self.runout.scatter(name) for name in compared.channels]))
         reason = np.full(compared.amplitude.shape, Reason.USED, dtype=object)
         for why, holds in (  # the last that holds is told
-                (Reason.NOT_QUASI_STATIC, ~(lag[:, None] <= rules.largest_lag)),
+                (Reason.STILL_RINGS if self._is_followed else Reason.NOT_QUASI_STATIC,
+                 ~(lag[:, None] <= rules.largest_lag)),
                 (Reason.NO_PREDICTION, ~np.isfinite(compared.predicted)),
                 (Reason.OUT_OF_TABLE, (speed < lowest) | (speed > highest)),
                 # Noise and runout are no motion of a housing either, predicted or not.
@@ -281,18 +284,37 @@ class Judge:
         columns = [self._predictor.channels.index(name) if name in self._predictor.channels
                    else -1 for name in names]
         unknown = np.array(columns) < 0
-        nominal = answer(self._predictor, speed)
-        predicted = nominal[:, columns]
+        stamps = np.array([vectors.stamp_ns for vectors in found])
+        steady, moved = self._answers(stamps, speed)
+        predicted = moved[:, columns]
         predicted[:, unknown] = complex(math.nan, math.nan)
         bounds = [np.full(amplitude.shape, np.nan)] * 4
         if self._envelope is not None:
-            band = self._envelope.at(speed).around(nominal)
+            band = self._envelope.at(speed).around(steady).opened(steady, moved)
             bounds = [np.where(unknown, np.nan, part[:, columns])
                       for part in (band.low, band.high, band.behind, band.ahead)]
         return Compared(
-            self.machine, np.array([vectors.stamp_ns for vectors in found]), speed, names,
-            amplitude, phase, np.array([vectors.deviation for vectors in found]), predicted,
-            *bounds)
+            self.machine, stamps, speed, names, amplitude, phase,
+            np.array([vectors.deviation for vectors in found]), predicted, *bounds)
+
+    def _answers(
+        self, stamp_ns: IntArray, speed: FloatArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return displacements without and with what changes of the speed have struck, (n, c)."""
+        steady = self._predictor.answer(speed)
+        moved = self._predictor.moved(steady, [
+            self._transient.at(stamp, told) if math.isfinite(told) else None
+            for stamp, told in zip(stamp_ns.tolist(), speed.tolist(), strict=True)])
+        return steady.displacement, moved.displacement
+
+    def _unsettled(self) -> Unsettled | None:
+        """Return who tells what the answer leaves out; None of an answer that is steady."""
+        return Unsettled(lambda: self._transient) if self._is_followed else None
+
+    @property
+    def _is_followed(self) -> bool:
+        """Whether the answers follow changes of the speed."""
+        return len(self._transient.poles) > 0
 
     def _strangers(self, now_ns: int) -> Iterator[Remark]:
         """Tell once which measured channels no prediction has: a slip in a name, mostly."""

@@ -14,7 +14,8 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.events import Event, NANOSECONDS, Predicted
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.monitor.comparison import Comparison
-from rotorsoil_ros.monitor.identification.case import identify_case, UsedVectors, Wanted
+from rotorsoil_ros.monitor.identification.case import identify_case, Wanted
+from rotorsoil_ros.monitor.identification.used import UsedVectors
 from rotorsoil_ros.monitor.identification.words import widening
 from rotorsoil_ros.monitor.inside import is_inside
 from rotorsoil_ros.monitor.points import ChannelPoints
@@ -224,7 +225,8 @@ def _ground(comparison: Comparison, minute: int) -> tuple[float, float] | None:
     rows = [_within(points, points.stamp_ns // MINUTE_NS == minute)
             for points in comparison.points]
     try:
-        speed = UsedVectors.of(replace(comparison, points=rows), wanted).speed
+        speed = UsedVectors.of(replace(comparison, points=rows),
+                               with_transients=wanted.with_transients).speed
         if np.ptp(speed) < _TELLING * speed.max():
             return None
         found = identify_case(replace(comparison, points=rows), wanted)

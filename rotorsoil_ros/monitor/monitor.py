@@ -20,6 +20,7 @@ from rotorsoil_ros.events import (
     Sink,
 )
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.transient.state import Transient
 from rotorsoil_ros.monitor.health import Health, STANDING, STANDSTILL
 from rotorsoil_ros.monitor.judge import Judge
 from rotorsoil_ros.monitor.oil import Oils, OilTables
@@ -52,14 +53,16 @@ class Monitor:
         self.health.standing = '; '.join(unstable(table.stability))
         self._sinks = tuple(sinks)
         self._unbalance, self._oils = unbalance, OilTables(oils or {})
-        self._predictor = table.predictor(unbalance)
-        self.judge = Judge(machine, self._predictor, judging or Judging(), hindsight=hindsight)
+        self._predictor, self._transient = table.predictor(unbalance), Transient(table.poles)
+        self.judge = Judge(machine, self._predictor, judging or Judging(),
+                           transient=self._transient, hindsight=hindsight)
 
     def set_unbalance(self, unbalance: ComplexArray) -> None:
         """Use another unbalance, (planes,) [kg m], from the next speed on."""
         self._unbalance = unbalance
         self._predictor = self.table.predictor(unbalance)
-        self.judge.take_predictor(self._predictor)
+        # What rings does so whatever the unbalance: it is followed as before.
+        self.judge.take_predictor(self._predictor, self._transient)
 
     def on_speed(
         self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray | None = None,
@@ -69,11 +72,13 @@ class Monitor:
             return
         self.health.receive(stamp_ns, speed)
         try:
-            prediction = self._predictor.predict(speed)
+            steady, answered = self._predictor.predict(speed), speed
             self.health.note('answered', len(speed))
         except OutOfTableError:
-            prediction = self._predict_with_gaps(speed)
-        self._emit(Predicted(self.machine, stamp_ns, prediction))
+            steady, answered = self._predict_with_gaps(speed)
+        prediction = self._predictor.moved(steady, self._transient.follow(stamp_ns, answered))
+        self._emit(Predicted(self.machine, stamp_ns, prediction,
+                             steady if len(self.table.poles) else None))
         if self.judge.on_speed(
                 stamp_ns, speed, np.full(len(speed), np.nan) if angle is None else angle):
             self._emit_all(self.judge.follow(stamp_ns, speed))
@@ -86,13 +91,14 @@ class Monitor:
     ) -> None:
         """Answer from another table and judge by other rules, from the next speed on."""
         self._unbalance, self._oils = unbalance, OilTables(oils or {})
-        self._predictor = table.predictor(unbalance)
-        self.judge = Judge(self.machine, self._predictor, judging or Judging())
         self._sinks = tuple(sinks)
         self._stand_on(table)
+        self._predictor = table.predictor(unbalance)
+        self.judge = Judge(self.machine, self._predictor, judging or Judging(),
+                           transient=self._transient)
 
     def _stand_on(self, table: ResponseTable) -> None:
-        self.table = table
+        self.table, self._transient = table, Transient(table.poles)
         self.health.speed_range = table.speed_range
         self.health.standing = '; '.join(unstable(table.stability))
 
@@ -153,8 +159,8 @@ class Monitor:
         for event in events:
             self._emit(event)
 
-    def _predict_with_gaps(self, speed: FloatArray) -> Prediction:
-        """Answer what is covered; count the reason and leave NaN where nothing is."""
+    def _predict_with_gaps(self, speed: FloatArray) -> tuple[Prediction, FloatArray]:
+        """Answer what is covered; count the reason and leave NaN where nothing is, (n,) too."""
         covered = self._predictor.covers(speed)
         for reason, holds in self._reasons(speed[~covered]).items():
             self.health.note(reason, int(np.count_nonzero(holds)))
@@ -165,7 +171,7 @@ class Monitor:
             self.health.note('answered', len(answer.speed))
             displacement[covered], force[covered] = answer.displacement, answer.force
         self._suspect_unit(speed)
-        return Prediction(speed, displacement, force)
+        return Prediction(speed, displacement, force), np.where(covered, speed, np.nan)
 
     def _suspect_unit(self, speed: FloatArray) -> None:
         """Ask back where speeds above the table lie in it in another unit."""

@@ -188,6 +188,8 @@ class PeakPair:
         Of the critical speed next to them [-]; NaN where none is known.
     allowed : Allowed
         By the prediction; NaN where there is none.
+    is_followed : bool
+        Whether the prediction knows how fast the peak was passed.
 
     """
 
@@ -196,12 +198,15 @@ class PeakPair:
     measured: Passage | None
     damping_ratio: float
     allowed: Allowed = field(default_factory=Allowed)
+    is_followed: bool = False
 
     @property
     def deviation(self) -> float:
         """Measured critical over predicted, less one: zero inside what a fast passage leaves."""
         if self.predicted is None or self.measured is None:
             return math.nan
+        if self.is_followed:  # both are late alike
+            return self.measured.speed / self.predicted.speed - 1.0
         low, high = self.measured.critical_range(
             0.0 if math.isnan(self.damping_ratio) else self.damping_ratio)
         return float(np.clip(self.predicted.speed, low, high)) / self.predicted.speed - 1.0
@@ -217,10 +222,15 @@ class PeakPair:
         passed = self.measured or self.predicted
         return bool(passed and passed.number(self.damping_ratio) >= SLOW_ENOUGH)
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a measured peak has to be where and as high as the predicted one."""
+        return self.is_followed or self.is_slow
+
 
 def pair(
     channel: str, predicted: Sequence[Passage], measured: Sequence[Passage], *,
-    allowed: Sequence[Allowed], resonances: Sequence[Resonance],
+    allowed: Sequence[Allowed], resonances: Sequence[Resonance], are_followed: bool = False,
 ) -> list[PeakPair]:
     """
     Pair predicted and measured peaks, the closest first.
@@ -235,6 +245,8 @@ def pair(
         What each predicted peak allows.
     resonances : sequence of Resonance
         Critical speeds of the machine.
+    are_followed : bool
+        Whether predicted peaks know how fast they were passed.
 
     """
     def damping_ratio(passage: Passage) -> float:
@@ -249,11 +261,11 @@ def pair(
             left.remove(i)
             right.remove(j)
             pairs.append(PeakPair(channel, predicted[i], measured[j],
-                                  damping_ratio(predicted[i]), allowed[i]))
-    pairs += [PeakPair(channel, predicted[i], None, damping_ratio(predicted[i]), allowed[i])
-              for i in sorted(left)]
-    pairs += [PeakPair(channel, None, measured[j], damping_ratio(measured[j]))
-              for j in sorted(right)]
+                                  damping_ratio(predicted[i]), allowed[i], are_followed))
+    pairs += [PeakPair(channel, predicted[i], None, damping_ratio(predicted[i]), allowed[i],
+                       are_followed) for i in sorted(left)]
+    pairs += [PeakPair(channel, None, measured[j], damping_ratio(measured[j]),
+                       is_followed=are_followed) for j in sorted(right)]
     return pairs
 
 
@@ -294,7 +306,7 @@ def peak_fault(peak: PeakPair, *, margin: float) -> str:
     if peak.measured is None:
         assert peak.predicted is not None
         # One that does not stand out, as from an unbalance that grows, is there all the same.
-        is_missing = peak.is_slow and not peak.allowed.shown >= peak.allowed.least
+        is_missing = peak.is_held and not peak.allowed.shown >= peak.allowed.least
         return '' if not is_missing else (
             f'{peak.channel}: the peak predicted at {rad_s_to_rpm(peak.predicted.speed):.0f} rpm '
             'was not measured')

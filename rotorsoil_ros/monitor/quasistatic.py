@@ -1,6 +1,6 @@
-"""Whether the speed changed slowly enough for a steady-state prediction to hold."""
+"""Whether a prediction holds: the speed changed slowly, or it is known since when it changed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 
@@ -9,6 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.machine.transient.state import LONGEST_GAP_NS, Transient
 from rotorsoil_ros.monitor.vectors.history import History, nearest
 
 # From p = 1.5 on the peak of a passage is within 4 % of the steady one, and a vibration that
@@ -53,7 +54,15 @@ def passage_number(resonance: Resonance, rate: float) -> float:
 
 
 def speed_rate(stamp_ns: IntArray, speed: FloatArray) -> FloatArray:
-    """Return the rate of speed [rad/s^2] at each sample, a slope fitted over its neighbours."""
+    """
+    Return the rate of speed [rad/s^2] at each sample, a slope fitted over its neighbours.
+
+    None is a neighbour across a gap in which nobody knows what the speed did.
+    """
+    ends = 1 + np.flatnonzero(np.diff(stamp_ns) > LONGEST_GAP_NS)
+    if len(ends):
+        return np.concatenate([speed_rate(*part) for part in zip(
+            np.split(stamp_ns, ends), np.split(speed, ends), strict=True)])
     rates = np.zeros(len(speed))
     inner = np.arange(_HALF, max(_HALF, len(speed) - _HALF))
     if len(inner):
@@ -138,22 +147,81 @@ class _Passed:
         return share
 
 
+class Unsettled:
+    """
+    Tells by which share of itself the response may still ring from before it was followed.
+
+    Parameters
+    ----------
+    transient : callable
+        Who follows the machine now, and takes it to be steady where it begins.
+
+    Notes
+    -----
+    Of a machine that came along at the rate of its beginning alpha / |A|^3 was missing then, and
+    if a resonance lies behind it, RINGING exp(-p tau) / sqrt(alpha): both decay with the mode.
+    Samples are taken in the order of time, in parts of any size.
+
+    """
+
+    def __init__(self, transient: Callable[[], Transient]) -> None:
+        self._transient = transient
+        self._began_ns = -1
+        self._missing = np.zeros(0)
+
+    def follow(self, stamp_ns: IntArray, speed: FloatArray, rate: FloatArray) -> FloatArray:
+        """Return the largest share of all modes at the next samples, (n,) [-]."""
+        transient = self._transient()
+        began_ns = np.array(transient.began_ns, dtype=np.int64)
+        last = np.searchsorted(began_ns, stamp_ns, side='right') - 1
+        share = np.full(len(speed), math.inf)  # before it began nothing is known
+        for row, (index, stamp, turning) in enumerate(zip(
+                last.tolist(), stamp_ns.tolist(), speed.tolist(), strict=True)):
+            if index < 0:
+                continue
+            if (began := int(began_ns[index])) != self._began_ns:
+                self._began_ns = began
+                self._missing = _missed(transient, turning, float(rate[row]))
+            pace = transient.rate(turning)
+            left = np.exp(pace.real * ((stamp - began) / NANOSECONDS)) * self._missing
+            share[row] = float((left * np.abs(pace)).max(initial=0.0))
+        return share
+
+
+def _missed(transient: Transient, speed: float, rate: float) -> FloatArray:
+    """Return by how much each envelope may have been off at a beginning, (k,) [s]."""
+    pace = transient.rate(speed)
+    turning = np.abs(transient.turns * rate)
+    missed = turning / np.abs(pace) ** 3
+    # A = Re A + i (1 - g) (omega - Omega): behind the resonance in the sense of the rate.
+    behind = (pace.imag * rate < 0.0) & (turning > 0.0)
+    damped, beyond = -pace.real[behind], np.abs(pace.imag[behind])
+    struck = np.minimum(RINGING / np.sqrt(turning[behind]), 1.0 / damped)
+    missed[behind] += struck * np.exp(-damped * beyond / turning[behind])
+    return np.asarray(missed)
+
+
 class Pace:
     """
     Decides once for every speed of a run how fast it changes and what that does to the answer.
 
     A rate needs speeds on both sides of a sample: it is settled some samples later. Live and
-    offline settle the same rates, however the speeds come in.
+    offline settle the same rates, however the speeds come in. Of an answer that follows the
+    changes of the speed `unsettled` makes who tells what it leaves out.
     """
 
-    def __init__(self, history: History, resonances: Sequence[Resonance]) -> None:
+    def __init__(
+        self, history: History, resonances: Sequence[Resonance],
+        unsettled: Callable[[], Unsettled | None] = lambda: None,
+    ) -> None:
         self._history = history
         self.resonances = tuple(resonances)
+        self._unsettled = unsettled
         self._begin()
 
     def _begin(self) -> None:
         self._epoch = self._history.epoch
-        self._lag = Lag(self.resonances)
+        self._lag = self._unsettled() or Lag(self.resonances)
         self._stamps = np.array([], dtype=np.int64)
         self._rates, self._shares = np.array([]), np.array([])
 

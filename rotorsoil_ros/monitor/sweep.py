@@ -155,6 +155,7 @@ class Sweeps:
     def __init__(self, machine: str, rules: Rules) -> None:
         self._machine, self._rules = machine, rules
         self.resonances: Sequence[Resonance] = ()
+        self.are_followed = False  # by what is predicted, with all that a sweep strikes
         self._finder = SweepFinder()
         self._marks: deque[Mark] = deque()
         self._traces: dict[Channel, Trace] = {}
@@ -234,7 +235,8 @@ class Sweeps:
         if peaks or mark.is_turn:
             self.faults = [fault for each in peaks if (
                 fault := peak_fault(each, margin=self._rules.critical_margin))]
-        self._seen = Lag(resonances_of(peaks)) if peaks else self._seen
+        if peaks:
+            self._seen = Lag(resonances_of([each for each in peaks if not self._is_met(each)]))
         yield from self._tell(mark.stamp_ns)
         yield from self._release(mark.stamp_ns)
         if mark.is_turn:
@@ -255,13 +257,20 @@ class Sweeps:
             return []
         margin, number = self._rules.critical_margin, self._number
         predicted = passages(trace.speed, trace.predicted, trace.rate, sweep=number)
+        if self.are_followed:
+            predicted, _ = without_ringing(predicted, self.resonances)
         allowed = [_allowed(trace, peak, margin) for peak in predicted]
         measured, lobes = without_ringing(
             passages(trace.speed, trace.amplitude, trace.rate, sweep=number), self.resonances)
         if lobes:
             self.lobes[channel] = [lobe.speed for lobe in lobes]
         return pair(channel, predicted, measured, allowed=allowed,
-                    resonances=self.resonances)
+                    resonances=self.resonances, are_followed=self.are_followed)
+
+    def _is_met(self, peak: PeakPair) -> bool:
+        """Return whether the prediction went through a measured peak as the machine did."""
+        return (self.are_followed and peak.is_complete
+                and abs(peak.deviation) <= self._rules.critical_margin)
 
     def _tell(self, now_ns: int) -> Iterator[Remark]:
         for each in self._current:
@@ -273,7 +282,7 @@ class Sweeps:
                 continue
             self._told.add(key)
             at = f'{each.channel}: the peak at {rad_s_to_rpm(passed.speed):.0f} rpm'
-            said = 'is as predicted' if each.is_slow else (
+            said = 'is as predicted' if each.is_held else (
                 'was passed too fast to be held against the prediction')
             yield Remark(self._machine, now_ns, Level.WARN if fault else Level.OK,
                          fault or f'{at} {said}')

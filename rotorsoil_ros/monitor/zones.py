@@ -25,7 +25,8 @@ from rotorsoil_ros.monitor.vectors.history import STEADY
 SECOND_PATIENCE_S = 2.0
 
 # Only such vectors are motions of the housing: others are noise, runout or no number.
-_MOTIONS = (Reason.USED, Reason.NOT_QUASI_STATIC, Reason.NO_PREDICTION, Reason.OUT_OF_TABLE)
+_MOTIONS = (Reason.USED, Reason.NOT_QUASI_STATIC, Reason.STILL_RINGS, Reason.NO_PREDICTION,
+            Reason.OUT_OF_TABLE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,8 @@ MOST_LAYOUTS = 64  # sets of channels that are measured together; more than that
 # Topics of a machine below the node's name, and their types.
 OWN_TOPICS = {
     'amplitude': JOINT_STATE, 'phase': JOINT_STATE, 'amplitude_low': JOINT_STATE,
-    'amplitude_high': JOINT_STATE, 'velocity_rms': JOINT_STATE, 'residual': JOINT_STATE,
+    'amplitude_high': JOINT_STATE, 'velocity_rms': JOINT_STATE, 'steady/amplitude': JOINT_STATE,
+    'steady/phase': JOINT_STATE, 'residual': JOINT_STATE,
     'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
     'model': STRING}
 
@@ -69,6 +70,8 @@ class Topics:
     amplitude_low: str
     amplitude_high: str
     velocity_rms: str
+    steady_amplitude: str
+    steady_phase: str
     residual: str
     demodulated_amplitude: str
     demodulated_phase: str
@@ -98,14 +101,23 @@ def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
     # may take another path for the tail of an array than for its body.
     squares = prediction.parts * prediction.parts
     sizes: FloatArray = np.sqrt(squares[:, 0] + squares[:, 1])
-    return sizes, sizes[:, 0] * prediction.speed[:, None]
+    velocity = sizes[:, 0] * prediction.speed[:, None]
+    if prediction.ringing is not None:
+        rows, moving = prediction.ringing
+        squares = moving * moving
+        velocity[rows] = np.sqrt(squares[:, 0] + squares[:, 1])
+    return sizes, velocity
 
 
 def phases(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
     """Return phases in [-pi, pi] [rad]: displacement and force, and velocity, as of i X."""
     parts = prediction.parts
     real, imag = parts[:, 0], parts[:, 1]
-    return np.arctan2(imag, real), np.arctan2(real[:, 0], -imag[:, 0])
+    velocity = np.arctan2(real[:, 0], -imag[:, 0])
+    if prediction.ringing is not None:
+        rows, moving = prediction.ringing
+        velocity[rows] = np.arctan2(moving[:, 1], moving[:, 0])
+    return np.arctan2(imag, real), velocity
 
 
 class JointStateWriter:
@@ -201,12 +213,20 @@ class Encoder:
         write = self._joint_states.write_parts
         # The amplitude is under way before the phase is even computed.
         sizes, velocity = moduli(event.prediction)
-        yield Records(topics.amplitude, JOINT_STATE, stamps, write(stamps, sizes, velocity))
-        yield Records(topics.phase, JOINT_STATE, stamps, write(stamps, *phases(event.prediction)))
+        amplitude = write(stamps, sizes, velocity)
+        yield Records(topics.amplitude, JOINT_STATE, stamps, amplitude)
+        phase = write(stamps, *phases(event.prediction))
+        yield Records(topics.phase, JOINT_STATE, stamps, phase)
         if self._housings:
             rms = velocity[:, self._housings] / math.sqrt(2.0)
             yield Records(topics.velocity_rms, JOINT_STATE, stamps, self._velocities.write_parts(
                 stamps, np.full((len(rms), 2, rms.shape[1]), np.nan), rms))
+        if (steady := event.steady) is not None:
+            if steady is not event.prediction:  # else the same bytes are said of both
+                amplitude = write(stamps, *moduli(steady))
+                phase = write(stamps, *phases(steady))
+            yield Records(topics.steady_amplitude, JOINT_STATE, stamps, amplitude)
+            yield Records(topics.steady_phase, JOINT_STATE, stamps, phase)
 
     def _band(self, event: Band) -> Iterator[Records]:
         stamps, speed = event.stamp_ns.tolist(), event.speed[:, None]

@@ -36,8 +36,11 @@ def test_answer_is_that_of_the_table_at_the_stamp_of_the_speed(watched, machine)
     predicted = events[0]
     exact = machine.table.predictor(machine.case.unbalance).predict(np.array([COVERED, 400.0]))
     assert predicted.stamp_ns.tolist() == [SECOND, SECOND + 1]
-    np.testing.assert_array_equal(predicted.prediction.displacement, exact.displacement)
-    np.testing.assert_array_equal(predicted.prediction.force, exact.force)
+    np.testing.assert_array_equal(predicted.steady.displacement, exact.displacement)
+    np.testing.assert_array_equal(predicted.steady.force, exact.force)
+    # It has jumped within a nanosecond: what it did at the first speed it still does.
+    np.testing.assert_array_equal(predicted.prediction.displacement[0], exact.displacement[0])
+    assert np.abs(predicted.prediction.displacement - exact.displacement)[1].max() > 0.0
 
 
 @pytest.mark.parametrize('speed, reason', [

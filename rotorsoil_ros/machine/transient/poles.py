@@ -73,10 +73,10 @@ class Poles:
     doubt: str = ''
 
     @classmethod
-    def none(cls, planes: int, width: int, doubt: str) -> 'Poles':
+    def none(cls, doubt: str) -> 'Poles':
         """Return no vibrations, and why."""
-        return cls(np.zeros(0, dtype=complex), np.zeros(0),
-                   np.zeros((0, planes, width), dtype=complex), math.nan, doubt)
+        return cls(np.zeros(0, dtype=complex), np.zeros(0), np.zeros((0, 0, 0), dtype=complex),
+                   math.nan, doubt)
 
     def __len__(self) -> int:
         """Return the number of vibrations."""
@@ -121,13 +121,13 @@ def poles_of(
 
     """
     planes, width = len(model.planes), len(model.groups)
-    speed, response = _sampled(model, speed_range, growth, dense)
+    speed, response = sampled(model, speed_range, growth, dense=dense)
     if len(speed) <= 2 * _MOST_NODES:
-        return Poles.none(planes, width, 'there is no steady response to learn from')
+        return Poles.none('there is no steady response to learn from')
     fitted = fit(speed, response.reshape(len(speed), -1), np.repeat(
         model.groups[None], planes, axis=0).ravel(), speed_range)
     if isinstance(fitted, str):
-        return Poles.none(planes, width, fitted)
+        return Poles.none(fitted)
     decay, strength, missed = fitted
     slope = np.array([_slope(model, each) for each in decay.tolist()])
     strength = strength.reshape(len(decay), planes, width)
@@ -197,17 +197,24 @@ def _struck(
     return decay[kept], strength[kept]
 
 
-def _sampled(
-    model: CoupledModel, speed_range: tuple[float, float], growth: Stability, dense: FloatArray,
+def sampled(
+    model: CoupledModel, speed_range: tuple[float, float], growth: Stability | None = None, *,
+    dense: FloatArray,
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return speeds (n,) and the response over the squared speed, (n, planes, w)."""
+    """
+    Return speeds (n,) and the response over the squared speed, (n, planes, w).
+
+    As `poles_of` takes them, and a little beyond the range where the machine is known there;
+    nothing of a machine that nobody can solve.
+    """
     low, high = speed_range
     for first, last in ((_BEYOND[0] * low, _BEYOND[1] * high), (low, high)):
         try:
             first, last = model.bearings.within_tables((first, last))
             even = np.linspace(first or last / _SAMPLES, last, _SAMPLES)
             speed = np.union1d(even, dense[(dense > 0.0) & (dense >= first) & (dense <= last)])
-            speed = speed[(speed > high) | growth.holds(speed)]
+            if growth is not None:
+                speed = speed[(speed > high) | growth.holds(speed)]
             displacement, force = model.synchronous_response(speed, model.plane_forces)
         except (OutOfTableError, NotSolvedError):
             continue

@@ -117,6 +117,10 @@ class Transient:
 
     Attributes
     ----------
+    poles : Poles
+        The vibrations.
+    turns : (k,) float array
+        1 - g: by how much the frequency of each comes nearer per speed.
     began_ns : tuple of int
         When the machine was taken to be steady for want of anything better [ns]: at the first
         speed, after a gap, where stamps go back.
@@ -125,8 +129,8 @@ class Transient:
 
     def __init__(self, poles: Poles) -> None:
         self.poles = poles
-        self._turns = 1.0 - poles.slope
-        self._decay = self._turns * poles.decay
+        self.turns = 1.0 - poles.slope
+        self._decay = self.turns * poles.decay
         self._now: _Moment | None = None
         self._past, self._began = deque[_Moment](maxlen=_PAST), deque[int](maxlen=_PAST)
 
@@ -134,10 +138,6 @@ class Transient:
     def began_ns(self) -> tuple[int, ...]:
         """When it was taken to be steady."""
         return tuple(self._began)
-
-    def begin(self) -> None:
-        """Take the machine to be steady at the next speed."""
-        self._now = None
 
     def follow(self, stamp_ns: IntArray, speed: FloatArray) -> list[Deviation]:
         """
@@ -201,13 +201,13 @@ class Transient:
 
     def rate(self, speed: float) -> ComplexArray:
         """Return A = (1 - g) (lambda - i Omega) of all vibrations, (k,) [1/s]."""
-        return np.asarray(self._decay - 1j * (speed * self._turns))
+        return np.asarray(self._decay - 1j * (speed * self.turns))
 
     def _stepped(self, moment: _Moment, speed: float, time: float) -> ComplexArray | None:
         """Return the envelopes when the speed has gone evenly to another; None if still steady."""
         envelopes = moment.envelopes
         if envelopes is None:
-            if speed == moment.speed or not len(self._turns):
+            if speed == moment.speed or not len(self.turns):
                 return None
             envelopes = -1.0 / self.rate(moment.speed)
         if time <= 0.0:  # the same moment told twice: the newer speed is taken, nothing has moved

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, NotSolvedError
-from rotorsoil_ros.events import Reason
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.machine.band import depends_on_soil
 from rotorsoil_ros.machine.coupled import CoupledModel
@@ -23,19 +22,13 @@ from rotorsoil_ros.monitor.identification.unknowns import (
     tolerances,
     unnamed_unbalance,
 )
-from rotorsoil_ros.monitor.points import ChannelPoints
+from rotorsoil_ros.monitor.identification.used import UsedVectors
 
 COUPLE = '_couple'
 GROWTH = 'growth of '
 RUNOUT = 'runout of '
 
 _MOST_KNOWN = 256  # responses
-
-# Speeds beyond these say no more, and each costs a solution.
-_MOST_ROWS = 240
-
-# Rows further apart than so many times the usual are not neighbours.
-_GAP = 3.0
 
 # Above this the columns look alike to the sensors: they trade against each other.
 _WORST_CONDITION = 30.0
@@ -166,11 +159,12 @@ def identify_case(comparison: Comparison, wanted: Wanted) -> Identification:
     expectation = comparison.expectation
     named(expectation.case, wanted.scalars)
     return identify_vectors(expectation.case, expectation.model,
-                            UsedVectors.of(comparison, wanted), wanted)
+                            UsedVectors.of(comparison, with_transients=wanted.with_transients),
+                            wanted)
 
 
 def identify_vectors(
-    case: Case, nominal: CoupledModel, run: 'UsedVectors', wanted: Wanted,
+    case: Case, nominal: CoupledModel, run: UsedVectors, wanted: Wanted,
 ) -> Identification:
     """
     Find unbalance and scalars of a case from vectors.
@@ -219,60 +213,6 @@ def identify_vectors(
 
 
 @dataclass(frozen=True)
-class UsedVectors:
-    """
-    Measured vectors that are used.
-
-    Attributes
-    ----------
-    channels : tuple of Channel
-        Where, c of them.
-    elapsed, speed : (n,) float arrays
-        Share of the run, and speed [rad/s].
-    measured : (n, c) complex array
-        [m, rad], NaN where there is none.
-    stretch : (n,) int array
-        Number of the uninterrupted stretch that a row belongs to.
-
-    """
-
-    channels: tuple[Channel, ...]
-    elapsed: FloatArray
-    speed: FloatArray
-    measured: ComplexArray
-    stretch: IntArray
-
-    @classmethod
-    def of(cls, comparison: Comparison, wanted: Wanted) -> 'UsedVectors':
-        chosen = [(points, usable) for points in comparison.points
-                  if (usable := _usable(points, wanted)).any()]
-        if not chosen:
-            raise NotSolvedError('the run holds no vector with a phase that could be used')
-        stamps = np.unique(np.concatenate([points.stamp_ns[usable] for points, usable in chosen]))
-        if len(stamps) > _MOST_ROWS:
-            stamps = stamps[np.linspace(0, len(stamps) - 1, _MOST_ROWS).round().astype(int)]
-        speed = np.full(len(stamps), np.nan)
-        measured = np.full((len(stamps), len(chosen)), complex(np.nan, np.nan))
-        for column, (points, usable) in enumerate(chosen):
-            own, first = np.unique(points.stamp_ns[usable], return_index=True)
-            _, row, at = np.intersect1d(stamps, own, return_indices=True)
-            measured[row, column] = points.measured[usable][first[at]]
-            speed[row] = points.speed[usable][first[at]]
-        step = np.diff(stamps)
-        gaps = step > _GAP * np.median(step) if len(step) else np.zeros(0, dtype=bool)
-        elapsed = (stamps - stamps[0]) / max(int(stamps[-1] - stamps[0]), 1)
-        return cls(tuple(points.channel for points, _ in chosen), elapsed, speed, measured,
-                   np.concatenate([[0], np.cumsum(gaps)]))
-
-
-def _usable(points: ChannelPoints, wanted: Wanted) -> BoolArray:
-    usable = points.used
-    if wanted.with_transients:
-        usable = usable | (points.reason == Reason.NOT_QUASI_STATIC)
-    return np.asarray(usable & np.isfinite(points.phase))
-
-
-@dataclass(frozen=True)
 class _Responding:
     """Responses (n, c, columns) of the case with its scalars multiplied."""
 
@@ -308,9 +248,11 @@ class _Responding:
         model = _rebuilt(self.case.changed(settings), self.nominal)
         rows = [model.channels.index(name) for name in self.run.channels]
         units = np.eye(len(model.planes), dtype=complex)
+        columns = [model.planes.index(plane) for plane in planes]
         response = np.stack([model.unbalance_response(
-            self.run.speed, units[model.planes.index(plane)]).displacement[:, rows]
-            for plane in planes], axis=-1)
+            self.run.speed, units[column]).displacement[:, rows] for column in columns], axis=-1)
+        if self.run.passing is not None:
+            response = response + self.run.passing.added(model, self.run.speed, rows, columns)
         asked = response[:, :, :len(self.planes)]
         parts = [asked]
         if self.wanted.growth:

@@ -31,7 +31,8 @@ def log(fan, tmp_path_factory):
     place = tmp_path_factory.mktemp('log')
     rpm = np.linspace(700.0, 1500.0, 20)
     answer = fan.response(rpm=rpm)[CHANNEL]
-    rows = zip(np.arange(20) * 10.0, rpm, 1.3 * answer.displacement_um_pp().ravel(),
+    # So far apart that each is a machine which has always turned so.
+    rows = zip(np.arange(20) * 11.0, rpm, 1.3 * answer.displacement_um_pp().ravel(),
                answer.phase_lag_deg().ravel(), strict=True)
     (place / 'run.csv').write_text('time,rpm,um,deg\n' + ''.join(
         ','.join(map(repr, map(float, row))) + '\n' for row in rows))
@@ -62,7 +63,7 @@ def column(rows, name):
 def test_every_speed_has_a_row_for_every_channel_with_what_the_table_says(rows, fan):
     assert list(rows[0]) == list(COLUMNS)
     assert {row['machine'] for row in rows} == {'plant_fan'}
-    stamps = [START + 10**10 * step for step in range(20)]
+    stamps = [START + 11 * 10**9 * step for step in range(20)]
     by_channel = {name: [row for row in rows if row['channel'] == name]
                   for name in fan.table.channels}
     assert sum(map(len, by_channel.values())) == len(rows)

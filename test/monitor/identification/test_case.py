@@ -10,7 +10,8 @@ from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import NotSolvedError
-from rotorsoil_ros.monitor.identification.case import identify_vectors, UsedVectors, Wanted
+from rotorsoil_ros.monitor.identification.case import identify_vectors, Wanted
+from rotorsoil_ros.monitor.identification.used import UsedVectors
 from rotorsoil_ros.monitor.identification.words import describe
 from rotorsoil_ros.units import rpm_to_rad_s
 
