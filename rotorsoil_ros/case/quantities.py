@@ -149,7 +149,8 @@ class Usual:
 
 A_NAME = Usual('stand_in')
 Name = Annotated[str, BeforeValidator(_name), A_NAME]
-FileName = Annotated[str, BeforeValidator(_file), Usual('stand_in.csv', 'stand_in_too.csv')]
+A_FILE = Usual('stand_in.csv')
+FileName = Annotated[str, BeforeValidator(_file), A_FILE]
 Count = Annotated[int, BeforeValidator(_count), Usual(4, 5, 9, 1, 31)]
 Ratio = Annotated[float, _number_in(''), Usual(0.3, 0.0, 1.0, 0.1, 2.0)]
 Metre = Annotated[float, _number_in('m'), Usual(0.1, 1.0, 0.0, 0.5, 6.0)]

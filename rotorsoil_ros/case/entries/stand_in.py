@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints, Literal
 
 from rotorsoil_ros.case.document import at
 from rotorsoil_ros.case.entries.entry import Entry, Place
-from rotorsoil_ros.case.quantities import A_NAME, Usual
+from rotorsoil_ros.case.quantities import A_FILE, A_NAME, Usual
 from rotorsoil_ros.channel import Channel
 
 # Keys whose values are names of others, and where those stand.
@@ -154,6 +154,8 @@ class StandIns:
 
     def _usual(self, kind: Any, place: Place) -> Sequence[Any]:
         """Return what a thing may be: for a name, those that the document speaks of."""
+        if _usual(kind) == A_FILE.values:  # of which nobody hears that it is not there
+            return [f'stand_in_{self._draw}.csv']
         if _usual(kind) != A_NAME.values:
             return _usual(kind)
         if place[-1] in _NAMED_IN:
