@@ -115,7 +115,7 @@ def test_case_opens_with_its_story_and_has_a_test_of_its_name(path):
     text = path.read_text()
     assert text.startswith('# ')
     assert re.search(rf'^name: {path.stem}$', text, re.MULTILINE)
-    assert (ROOT / 'test' / 'case' / f'test_{path.stem}.py').exists()
+    assert list((ROOT / 'test' / 'case').rglob(f'test_{path.stem}.py'))
 
 
 @pytest.mark.parametrize('path', CASES, ids=lambda path: path.stem)
