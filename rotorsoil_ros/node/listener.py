@@ -19,7 +19,7 @@ from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC
 LOOK_S = 1.0  # how often the graph is searched for machines
 # Nobody resends to a feed, and nobody waits for one: the next value is worth more than the last.
 VALUES = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-EVERY_VALUE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)  # of who sends them on
+RESENT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)  # of who sends them on
 REPORTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 MODELS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                     durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -35,7 +35,7 @@ class GraphListener(Node):  # type: ignore[misc]
     def __init__(self, inbox: Taker, context: Context, *, every: bool = False) -> None:
         super().__init__('rotorsoil_feed', context=context, start_parameter_services=False,
                          enable_rosout=False)
-        self._inbox, self._values = inbox, EVERY_VALUE if every else VALUES
+        self._inbox, self._values = inbox, RESENT if every else VALUES
         self._heard: set[str] = set()
         self._hear(DIAGNOSTICS_TOPIC, DIAGNOSTICS, REPORTS)
         self.create_timer(LOOK_S, self._look)
