@@ -8,6 +8,8 @@ import pytest
 
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.config import case_of
+from rotorsoil_ros.case.entries.stand_in import hints, StandIns
+from rotorsoil_ros.case.schema import FoundationEntry
 from rotorsoil_ros.errors import InputError
 
 CONFIG = Path(__file__).parents[2] / 'config'
@@ -252,3 +254,10 @@ def test_what_hangs_on_a_fault_is_not_told(tmp_path, content, place):
       "letter, got 'Wheel'"])])
 def test_nothing_is_told_that_goes_with_another_fault(tmp_path, settings, lines):
     assert faults_of(CASES[0][0], settings, tmp_path) == lines
+
+
+def test_a_name_put_in_the_place_of_another_is_nobody_elses():
+    """The wheel that unbalances name is there: what stands in for a block is not called so."""
+    name = hints(FoundationEntry)['name']
+    assert not {StandIns(CASES[0][0], draw).of(name, ('foundations', 1, 'name'))
+                for draw in range(32)} & {'wheel', 'block', 'plant_fan', 'drive_end'}

@@ -160,7 +160,9 @@ class StandIns:
             return _usual(kind)
         if place[-1] in _NAMED_IN:
             return _names(at(self._content, _NAMED_IN[place[-1]])) or _FRESH[:1]
-        return [*dict.fromkeys((*_spoken_of(self._content), *_measured(self._content))), *_FRESH]
+        meant = dict.fromkeys((*_spoken_of(self._content), *_measured(self._content), *_FRESH))
+        # One that is taken already would put what has it at fault.
+        return [name for name in meant if name not in set(_declared(self._content))]
 
     def _one_of(self, values: Sequence[Any], place: Place, attempt: int) -> Any:
         order = random.Random(repr(place)).sample(range(len(values)), len(values))
@@ -193,6 +195,16 @@ def _spoken_of(content: Any) -> Iterator[str]:
     elif isinstance(content, list):
         for value in content:
             yield from _spoken_of(value)
+
+
+def _declared(content: Any) -> Iterator[str]:
+    """Yield what things of a document are called."""
+    if isinstance(content, Mapping):
+        if isinstance(content.get('name'), str):
+            yield content['name']
+        content = list(content.values())
+    for value in content if isinstance(content, list) else ():
+        yield from _declared(value)
 
 
 def _measured(content: Any) -> Iterator[str]:
