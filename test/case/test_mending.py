@@ -192,14 +192,14 @@ CASES = [(document.read(CONFIG / 'plant_fan.yaml'), FAN),
 EACH = [(content, *one) for content, breakages in CASES for one in breakages]
 
 
-def faults_of(content, breakages, tmp_path):
+def faults_of(content, breakages, tmp_path, file='case.yaml'):
     """Return what is wrong with a broken document, a line each."""
     content = deepcopy(content)
     for breakage in breakages:
         breakage(content)
     with pytest.raises(InputError) as caught:
-        case_of(Path('case.yaml'), content, cache_directory=tmp_path)
-    return [line.removeprefix('case.yaml: ') for line in str(caught.value).splitlines()]
+        case_of(Path(file), content, cache_directory=tmp_path)
+    return [line.removeprefix(f'{file}: ') for line in str(caught.value).splitlines()]
 
 
 @pytest.mark.parametrize('content, breakage, line', EACH, ids=[line[:40] for *_, line in EACH])
@@ -219,6 +219,22 @@ def test_all_are_told_in_one_run_and_no_other(tmp_path, content, breakages, seed
 def test_everything_is_told_at_once(tmp_path, content, breakages):
     assert sorted(faults_of(content, [breakage for breakage, _ in breakages], tmp_path)) == sorted(
         line for _, line in breakages)
+
+
+def test_machines_on_one_block_tell_all_at_once_though_their_rotors_lie_elsewhere(tmp_path):
+    file = CONFIG / 'fan_house.yaml'
+    broken = [
+        (put('source', 'fan_1'), None),
+        (put('soil.poisson_ratio', 0.5), 'soil.poisson_ratio: must be in [0, 0.5), of undrained '
+                                         '(saturated) soil 0.49, got 0.5'),
+        (put('foundations.0.mass', -1.0),
+         'foundations.0.mass: must be >= 0 kg and finite, got -1'),
+        (put('machines.0.place.x', 'left'),
+         "machines.0.place.x: must be a finite number in m, got 'left'"),
+        (put('machines.1.unbalances.0.disc', 'weel'),
+         'machines.1.unbalances.0.disc: must be one of coupling, wheel, got weel')]
+    told = faults_of(document.read(file), [breakage for breakage, _ in broken], tmp_path, file)
+    assert sorted(told) == sorted(line for _, line in broken if line)
 
 
 def places(content, above=()):

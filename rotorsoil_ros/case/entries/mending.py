@@ -110,13 +110,14 @@ class _Mended:
             if attempt > _LAST_ATTEMPT or not isinstance(parent, (dict, list)):
                 place = place[:-1] if len(place) > 2 else ()
             elif new := self._another(
-                    parent, place, attempt, may_go=place == fault and attempt == _LAST_ATTEMPT):
+                    parent, place, attempt, goes=attempt == _LAST_ATTEMPT if place == fault
+                    else isinstance(inside(parent, place[-1:]), list)):
                 changed |= new
                 return True
         return False
 
     def _another(
-        self, parent: Any, place: Place, attempt: int, *, may_go: bool,
+        self, parent: Any, place: Place, attempt: int, *, goes: bool,
     ) -> set[Place]:
         """Put something else at a place; return where the document is another one."""
         if isinstance(parent, list):
@@ -128,7 +129,7 @@ class _Mended:
         if in_a_way and (changed := self._whole(place[:-1], owner, parent, attempt=0)):
             return changed
         field = owner.model_fields[str(place[-1])]
-        if may_go and not in_a_way and place[-1] in parent and not field.is_required():
+        if goes and not in_a_way and place[-1] in parent and not field.is_required():
             del parent[place[-1]]
             return {place}
         return self._put(parent, place, attempt)

@@ -13,7 +13,7 @@ from rotorsoil_ros.case.quantities import A_FILE, A_NAME, Usual
 from rotorsoil_ros.channel import Channel
 
 # Keys whose values are names of others, and where those stand.
-_NAMED_IN = {'foundation': 'foundations', 'disc': 'rotor.discs'}
+_NAMED_IN = {'foundation': 'foundations', 'disc': 'discs'}
 # What nothing in a case is called.
 _FRESH = ('stand_in', 'stand_in_2', 'stand_in_3', 'stand_in_4')
 
@@ -116,7 +116,7 @@ class StandIns:
 
     def of(self, kind: Any, place: Place, *, attempt: int = 0) -> Any:
         """Return a value of a kind for a place; a further attempt is another one."""
-        known = choices(kind)
+        known = [choice for choice in choices(kind) if not _needs_file(choice)]
         if not known:
             return False
         choice = self._one_of(known, (*place, 'kind'), attempt)
@@ -159,7 +159,7 @@ class StandIns:
         if _usual(kind) != A_NAME.values:
             return _usual(kind)
         if place[-1] in _NAMED_IN:
-            return _names(at(self._content, _NAMED_IN[place[-1]])) or _FRESH[:1]
+            return list(_names(self._content, _NAMED_IN[place[-1]])) or _FRESH[:1]
         meant = dict.fromkeys((*_spoken_of(self._content), *_measured(self._content), *_FRESH))
         # One that is taken already would put what has it at fault.
         return [name for name in meant if name not in set(_declared(self._content))]
@@ -180,9 +180,24 @@ def _rising(values: list[Any]) -> list[Any]:
     return sorted(values) if all(isinstance(value, float) for value in values) else values
 
 
-def _names(entries: Any) -> list[str]:
-    return [entry['name'] for entry in (entries if isinstance(entries, list) else ())
-            if isinstance(entry, Mapping) and isinstance(entry.get('name'), str)]
+def _needs_file(kind: Any) -> bool:
+    """Return whether a mapping is what another file says, which nobody has here."""
+    return isinstance(kind, type) and issubclass(kind, Entry) and any(
+        field.is_required() and _usual(hints(kind)[name]) == A_FILE.values
+        for name, field in kind.model_fields.items())
+
+
+def _names(content: Any, group: str) -> Iterator[str]:
+    """Yield the names in every list of a document that is called so."""
+    if isinstance(content, list):
+        for value in content:
+            yield from _names(value, group)
+    elif isinstance(content, Mapping):
+        for key, value in content.items():
+            for entry in value if key == group and isinstance(value, list) else ():
+                if isinstance(entry, Mapping) and isinstance(entry.get('name'), str):
+                    yield entry['name']
+            yield from _names(value, group)
 
 
 def _spoken_of(content: Any) -> Iterator[str]:
