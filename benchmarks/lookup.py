@@ -21,6 +21,9 @@ from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.machine.band import ResponseBand
 from rotorsoil_ros.machine.spread import SoilSpread
+from rotorsoil_ros.machine.transient.poles import poles_of
+from rotorsoil_ros.machine.transient.state import Transient
+from rotorsoil_ros.prediction import Prediction
 
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 SAMPLES = 200_000
@@ -42,6 +45,28 @@ def look_ups(machine: Machine) -> None:
     for index in range(2000):
         predictor.predict(speed[index:index + 1])
     print(f'look-up, one by one: {(time.perf_counter() - start) / 2000 * 1e6:.3g} us')
+
+
+def run_up(machine: Machine) -> None:
+    """Print what it costs to find what a changing speed strikes, and to follow it."""
+    table = machine.table
+    start = time.process_time()
+    for _ in range(5):
+        poles_of(machine.model, table.speed_range, table.stability, dense=table.pieces.edges)
+    print(f'free vibrations of a table: {len(table.poles)} in '
+          f'{(time.process_time() - start) / 5 * 1e3:.3g} ms')
+    predictor = table.predictor(machine.case.unbalance)
+    stamps = np.arange(2000) * 10**7
+    ramp = np.linspace(*table.speed_range, 2000)
+    for name, speed in (('speeding up', ramp), ('constant speed', np.full(2000, ramp[1000]))):
+        steady, transient = predictor.predict(speed), Transient(table.poles)
+        start = time.process_time()
+        for index in range(2000):
+            here = slice(index, index + 1)
+            one = Prediction.of_parts(speed[here], steady.parts[here])
+            predictor.moved(one, transient.follow(stamps[here], speed[here]))
+        print(f'what is struck, {name}: {(time.process_time() - start) / 2000 * 1e6:.3g} us a '
+              'speed')
 
 
 def end_to_end(machine: Machine, directory: Path) -> None:
@@ -97,6 +122,7 @@ def main() -> None:
         directory = Path(name)
         machine = Machine.load(CASE, cache_directory=directory)
         look_ups(machine)
+        run_up(machine)
         end_to_end(machine, directory)
         band(machine)
         start_and_stop(directory)
