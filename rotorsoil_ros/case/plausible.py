@@ -143,7 +143,9 @@ def _of_block(case: Case, place: str, block: Foundation) -> Iterator[str]:
             yield (f'{place}.mass: {_number(block.mass)} kg in its volume make {density:.4g} '
                    f'kg/m^3; a block of concrete would have '
                    f'{_number(2400.0 * block.contact.area * block.height)} kg')
-    if block.height is not None and case.rotor.shaft_height <= block.height:
+    # The lower end of a shaft that stands may be at the top of its block.
+    if (block.height is not None and case.rotor.shaft_height <= block.height
+            and not case.rotor.is_upright):
         yield (f'rotor.shaft_height: {_number(case.rotor.shaft_height)} m is not above the top of '
                f'{block.name}, {_number(block.height)} m; it counts from the contact: did you '
                f'mean {_number(case.rotor.shaft_height + block.height)}?')

@@ -20,7 +20,7 @@ from rotorsoil_ros.case.design.tables import (
 )
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
-from rotorsoil_ros.case.summary import undecided
+from rotorsoil_ros.case.summary import undecided, unstable
 from rotorsoil_ros.cli.progress import progress
 from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.cli.table import write_table
@@ -30,7 +30,7 @@ from rotorsoil_ros.figures.damping import damping_figure
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
 from rotorsoil_ros.figures.response import all_figures, compliance_figure, main_peaks
-from rotorsoil_ros.figures.transmissibility import transmissibility_figure
+from rotorsoil_ros.figures.transmissibility import fastest_steady, transmissibility_figure
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.cone import ConeModel
@@ -60,6 +60,8 @@ def plot(arguments: Namespace) -> int:
             path = arguments.output / f'{name}.png'
             figure.savefig(path, dpi=150)
             print(path)
+    for line in unstable(machine.table.stability):
+        print(f'{case.path}: {line}', file=sys.stderr)
     return 0
 
 
@@ -86,8 +88,14 @@ def _studies(
 
 def _ground_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, 'Figure']]:
     """Yield what ground that moves does to the machine, where something is between them."""
-    if case.support.model != 'rigid':
-        yield 'transmissibility', transmissibility_figure(case, model)
+    if case.support.model == 'rigid':
+        return
+    speed = fastest_steady(model, case.speed_range)
+    if speed is None:
+        print(f'no picture transmissibility: {case.path}: unstable at all speeds',
+              file=sys.stderr)
+    else:
+        yield 'transmissibility', transmissibility_figure(case, model, speed=speed)
 
 
 def _soil_figures(

@@ -13,16 +13,21 @@ from rotorsoil_ros.machine.damping import (
     BEARINGS,
     DampingSplit,
     DampingSplitter,
+    EXTERNAL,
+    INTERNAL,
     MATERIAL,
     PEDESTALS,
     RADIATION,
     SOIL,
+    TORQUE,
 )
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.units import rad_s_to_rpm
 
-_COLOURS = dict(zip((RADIATION, MATERIAL, BEARINGS, PEDESTALS, SOIL),
-                    (COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], 'grey'), strict=True))
+_COLOURS = dict(zip(
+    (RADIATION, MATERIAL, BEARINGS, PEDESTALS, SOIL, INTERNAL, EXTERNAL, TORQUE),
+    (*COLOURS[:4], 'grey', 'firebrick', 'darkkhaki', 'black'), strict=True))
 _SPEEDS = 241
 _MOST_MODES = 12
 
@@ -31,7 +36,8 @@ def damping_figure(case: Case, model: CoupledModel) -> Figure:
     """Draw what takes the energy of the unbalance, and what damps the modes."""
     splitter = DampingSplitter(model)
     speed = np.linspace(*case.speed_range, _SPEEDS)[1:]
-    forced = splitter.forced(speed, case.unbalance)
+    forced = splitter.forced(speed, case.unbalance).where(
+        stability(model, case.speed_range).holds(speed))
     criticals = critical_speeds(model, model.bearings.within_tables(case.speed_range))
     modes = [(critical, split) for critical, split in zip(
         criticals, splitter.of_modes(criticals), strict=True) if split is not None][:_MOST_MODES]

@@ -8,24 +8,33 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import ACROSS, across, HOUSING
 from rotorsoil_ros.figures.response import COLOURS, legend_below, tidy
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.machine.transmissibility import ALONG, Transmissibility
 from rotorsoil_ros.units import rad_s_to_rpm
 
 _POINTS = 481
 # What is smaller is nothing that anybody would feel.
 _SMALLEST = 1e-2
+# Among so many speeds one is looked for at which the machine is stable.
+_SPEEDS = 41
 _STYLES = ('-', '--', '-.', ':')
 
 
-def transmissibility_figure(case: Case, model: CoupledModel) -> Figure:
+def fastest_steady(model: CoupledModel, speed_range: tuple[float, float]) -> float | None:
+    """Return the highest speed of a range that all tables know and no mode grows at, if any."""
+    speeds = np.linspace(*model.bearings.within_tables(speed_range), _SPEEDS)
+    steady = speeds[stability(model, (speeds[0], speeds[-1])).holds(speeds)]
+    return float(steady[-1]) if len(steady) else None
+
+
+def transmissibility_figure(case: Case, model: CoupledModel, *, speed: float) -> Figure:
     """
     Draw the motion of every housing per motion of the ground, a row for each of its directions.
 
-    The rotor turns at the highest speed of the case that all tables of bearings know; what it
-    does to the housings hardly depends on that.
+    The rotor turns at a speed [rad/s] at which it is stable; what it does to the housings hardly
+    depends on it.
     """
     low, high = model.support.known(case.speed_range[1])
-    speed = model.bearings.within_tables(case.speed_range)[1]
     omega = np.linspace(max(low, high / _POINTS), high, _POINTS)
     found = Transmissibility.of(model, omega, speed=speed)
     figure = Figure(figsize=(7.5, 6.5), layout='constrained')

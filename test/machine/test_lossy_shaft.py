@@ -11,6 +11,7 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.damping import DampingSplitter, EXTERNAL, INTERNAL, TORQUE
 from rotorsoil_ros.machine.modes.campbell import campbell
 from rotorsoil_ros.machine.modes.critical import critical_speeds
+from rotorsoil_ros.machine.modes.feeding import _torque_feeds
 from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing
@@ -200,13 +201,17 @@ def test_modes_of_a_table_over_frequency_are_where_its_own_frequency_says():
 
 def test_what_is_not_looked_at_is_told():
     # A torque feeds without bound, and a table over frequency says nothing beyond its ends.
-    light = jeffcott(torque=300.0, drag=2.0)
+    light = jeffcott(torque=3e3, drag=2.0)
     assert stability(light, (10.0, 2.0 * NATURAL)).untold_above == math.inf  # has one mode
     [section] = light.rotor.shaft
     heavy = replace(light.rotor, shaft=(replace(section, material=STEEL),))
     twisted = stability(CoupledModel(heavy), (10.0, 2.0 * NATURAL))
     assert twisted.untold_above == twisted.highest == pytest.approx(4.8 * 2.0 * NATURAL)
     assert twisted.untold_why == 'the torque could feed one, and none was looked for'
+    # So little that nobody misses it: 4e-4 of damping ratio for 300 N m.
+    [section] = heavy.shaft
+    little = replace(heavy, shaft=(replace(section, torque=300.0),))
+    assert stability(CoupledModel(little), (10.0, 2.0 * NATURAL)).untold_above == math.inf
     skew = np.array([[0.0, -1e5], [1e5, 0.0]])
     seal = Bearing('seal', 0.5 * LENGTH, None, FrequencyTable(
         NATURAL * np.array([0.5, 1.5]), (skew, skew)), 10.0 * np.eye(2))
@@ -233,3 +238,5 @@ def test_torque_that_nothing_damps_feeds_a_whirl_as_the_full_eigenproblem_says()
     assert nearest.frequency == pytest.approx(worst.imag, rel=1e-6)
     assert nearest.damping_ratio == pytest.approx(-worst.real / abs(worst), rel=1e-4)
     assert nearest.feeds[0].cause == 'torque'
+    # What a torque takes at most bounds every one of them.
+    assert np.max(exact.real / np.abs(exact)) < _torque_feeds(model) < 0.5

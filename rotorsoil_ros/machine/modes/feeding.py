@@ -26,6 +26,12 @@ _ARTEFACT = 1e-3
 # for up to so many times the highest speed.
 BOUNDLESS = 4.0
 
+# A damping ratio below which what a torque takes is not missed: steel alone has more.
+_FELT = 1e-3
+
+# Of a torque that goes through, what both sides of a node have of it, relative to it.
+_CANCELLED = 1e-9
+
 # Share of the largest 1 / omega^2 below which a mode of the mesh has no mass.
 _MASSLESS = 1e-13
 
@@ -102,7 +108,7 @@ def _of_shaft(model: CoupledModel, fastest_speed: float) -> float:
     losses = model.rotor.losses
     if losses is None:
         return 0.0
-    if losses.torsion.any():
+    if _torque_feeds(model) > 0.0:
         return BOUNDLESS * fastest_speed
     # Material feeds a whirl that is slower than the rotor; it grows by its loss factor at most.
     return (1.0 + float(losses.is_hysteretic)) * fastest_speed * bool(
@@ -115,11 +121,29 @@ def _gives(inertia: _Range) -> bool:
 
 def boundless(model: CoupledModel, span: tuple[float, float]) -> str:
     """Return what may feed a mode of any frequency; nothing where all of it is bounded."""
-    losses = model.rotor.losses
-    if losses is not None and losses.torsion.any():
+    if _torque_feeds(model) > _FELT:
         return 'the torque'
     heavy = any(_gives(inertia) for _, _, inertia in _of_everything(model, span))
     return 'the mass of a seal' if heavy else ''
+
+
+def _torque_feeds(model: CoupledModel) -> float:
+    """
+    Return which damping ratio a torque takes from a mode at most.
+
+    It gives by its symmetric part alone, at the slopes of its ends. Of a motion of unit strain
+    energy these are what couples there bend.
+    """
+    losses = model.rotor.losses
+    if losses is None or not losses.torsion.any():
+        return 0.0
+    giving = 0.5 * (losses.torsion + losses.torsion.T)
+    rows = np.flatnonzero(np.abs(giving).max(axis=0) > _CANCELLED * np.abs(losses.torsion).max())
+    stiffness, _, _ = held(model.rotor, model.nominal_springs)
+    bent = scipy.linalg.cho_solve(scipy.linalg.cho_factor(stiffness),
+                                  np.eye(len(stiffness))[:, rows])[rows]
+    values = scipy.linalg.eigvals(bent @ giving[np.ix_(rows, rows)])
+    return 0.5 * float(np.abs(values).max(initial=0.0))
 
 
 def fastest(model: CoupledModel) -> float:
