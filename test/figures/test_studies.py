@@ -9,6 +9,7 @@ import pytest
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.design.tables import infinite_element_model
 from rotorsoil_ros.figures.bearings import bearing_figures
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.response import compliance_figure, main_peaks
@@ -30,7 +31,7 @@ def paper(tmp_path_factory):
     table = models.response_table(case, model, directory)
     predictor = table.predictor(case.unbalance)
     figures = dict(modal_figures(case, model))
-    infinite = models.infinite_element_model(
+    infinite = infinite_element_model(
         case.soil, case.foundations[0].contact, 'disc', cache=Cache(directory),
         speed_range=case.speed_range)
     figures['compliance'] = compliance_figure(
