@@ -160,6 +160,19 @@ def test_bad_file_is_one_line_and_status_2(tmp_path, capsys, old, new, problem):
     assert not (tmp_path / 'case.yaml').exists()
 
 
+def test_all_numbers_that_are_none_are_told_at_once(tmp_path, capsys):
+    path = changed(tmp_path, ('L = 0.2\n', 'L = "x"\n'), ('E = 211000000000.0', 'E = 0.0'),
+                   ('m = 20.0', 'm = nan'), ('kxx = [ 10000000.0,]', 'kxx = [ true,]'))
+    assert main(['import-ross', str(path), '-o', str(tmp_path / 'case.yaml')]) == 2
+    told = capsys.readouterr().err.splitlines()
+    for line in ("ShaftElement_Shaft Element 0.L: must be a finite number, got 'x'",
+                 'ShaftElement_Shaft Element 0.material.E: must be > 0 Pa, got 0',
+                 'DiskElement_Disk 0.m: must be a finite number, got nan',
+                 'BearingElement_Bearing 0.kxx: must be finite numbers in N/m, got True'):
+        assert told.count(f'{path}: {line}') == 1
+    assert len(told) == 4
+
+
 @pytest.mark.parametrize('content, problem', [
     (b'', 'holds no ShaftElement; is it a rotor saved by ROSS?'),
     (b'a = 3\n', 'holds no ShaftElement'), (b'\xff', 'is not a text file in UTF-8 (byte 0)'),

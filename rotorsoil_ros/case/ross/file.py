@@ -1,7 +1,8 @@
 """What a file of ROSS says, TOML or JSON, read with suspicion."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 import json
 import math
 from pathlib import Path
@@ -37,11 +38,14 @@ class RossFile:
         Where it lies.
     tables : dict
         What it holds.
+    faults : dict
+        Numbers that are none, by the lines that tell them: read on, all are told together.
 
     """
 
     path: Path
     tables: dict[str, Any]
+    faults: dict[str, None] = field(default_factory=dict)
 
     @classmethod
     def read(cls, path: Path) -> 'RossFile':
@@ -90,13 +94,28 @@ class RossFile:
     def number(
         self, title: str, table: Table, key: str, default: float | None = None,
     ) -> float:
-        """Return a finite number; without a default it has to be there."""
+        """Return a finite number; without a default it has to be there, else a fault is kept."""
         value = table.get(key, default)
         if value is None:
-            raise self.error(f'{title}.{key}', 'is missing')
+            return self.kept(f'{title}.{key}', 'is missing')
         if not _is_number(value):
-            raise self.error(f'{title}.{key}', f'must be a finite number, got {shown(value)}')
+            return self.kept(f'{title}.{key}', f'must be a finite number, got {shown(value)}')
         return float(value)
+
+    def kept(self, place: str, problem: str) -> float:
+        """Keep a fault; return a number in place of what is none."""
+        self.faults[str(self.error(place, problem))] = None
+        return 1.0
+
+    @contextmanager
+    def telling_all(self) -> Iterator[None]:
+        """Raise one InputError with every fault that was kept, and with one that ends it."""
+        try:
+            yield
+        except InputError as error:
+            self.faults[str(error)] = None
+        if self.faults:
+            raise InputError('\n'.join(self.faults))
 
     def numbers(self, title: str, table: Table, key: str, unit: str) -> list[float]:
         """Return coefficients, of which older files have one as a bare number."""
@@ -105,8 +124,9 @@ class RossFile:
             return [self.number(title, table, key)]
         for value in values:
             if not _is_number(value):
-                raise self.error(f'{title}.{key}', f'must be finite numbers in {unit}, '
-                                                   f'got {shown(value)}')
+                self.kept(f'{title}.{key}', f'must be finite numbers in {unit}, '
+                                             f'got {shown(value)}')
+                return [float(number) for number in range(len(values))]
         if not values:
-            raise self.error(f'{title}.{key}', 'is empty')
+            return [self.kept(f'{title}.{key}', 'is empty')]
         return [float(value) for value in values]

@@ -58,7 +58,9 @@ def read(path: Path, speed_range_rpm: tuple[float, float] | None = None) -> Impo
         If the file is not such a rotor, or nothing of it could stand.
 
     """
-    return _Importer(RossFile.read(path)).imported(speed_range_rpm)
+    file = RossFile.read(path)
+    with file.telling_all():
+        return _Importer(file).imported(speed_range_rpm)
 
 
 @dataclass

@@ -141,7 +141,7 @@ class ShaftReader:
         place = f'{title}.material'
         young = self.file.number(place, material, 'E')
         if not young > 0.0:
-            raise self.file.error(f'{place}.E', f'must be > 0 Pa, got {young:g}')
+            self.file.kept(f'{place}.E', f'must be > 0 Pa, got {young:g}')
         poisson = (self.file.number(place, material, 'Poisson') if 'G_s' not in material
                    else young / (2.0 * self.file.number(place, material, 'G_s')) - 1.0)
         return {'young_modulus': young, 'poisson_ratio': poisson,
