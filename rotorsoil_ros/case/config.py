@@ -122,6 +122,11 @@ class Case:
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
+    @property
+    def file(self) -> Path:
+        """Path by which `load` reads this machine again."""
+        return self.path if self.berth is None else Path(f'{self.path}#{self.name}')
+
     def with_oil_of(self, celsius: float) -> 'Case':
         """Return this case with films of another mean temperature [deg C], and no other."""
         entries = [entry.get('journal') or {} for entry in self.content['rotor']['bearings']]
@@ -158,7 +163,7 @@ def load(
     Parameters
     ----------
     path : Path
-        The YAML file.
+        The YAML file; `FILE#NAME` is one of its machines.
     overrides : sequence of str
         Settings `key.path=value` that replace or add to what the file says, in order.
     cache_directory : Path or None
@@ -175,8 +180,9 @@ def load(
         One line: file, key path, what is wrong, in which unit, and the value.
 
     """
+    path, own = document.chosen(path)
     content = document.read(path)
-    document.override(content, overrides)
+    document.override(content, [*own, *overrides])
     return case_of(path, content, cache_directory=cache_directory)
 
 

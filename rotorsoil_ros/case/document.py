@@ -103,6 +103,18 @@ def read(path: Path) -> dict[str, Any]:
     return document
 
 
+def chosen(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """
+    Return a file and the settings that its name brings.
+
+    `FILE#NAME` is the machine of that name among several, unless a file is called so.
+    """
+    file, mark, source = str(path).rpartition('#')
+    if not mark or path.exists():
+        return path, ()
+    return Path(file), (f'source={source}',)
+
+
 def parse(text: str, *, source: str) -> Any:
     """Return what a YAML text says; an InputError names the source and the line."""
     try:

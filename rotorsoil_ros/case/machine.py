@@ -342,7 +342,7 @@ def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: 
     Parameters
     ----------
     case : str or Path
-        The YAML file.
+        The YAML file; `FILE#NAME` is one of its machines.
     cache_directory : Path or None
         Where computed tables lie; None for $ROTORSOIL_CACHE, else the user's cache directory.
     **overrides
@@ -360,8 +360,9 @@ def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: 
         If the file is wrong, one line for each fault: file, key path, rule, unit and value.
 
     """
-    path = Path(case)
+    path, own = document.chosen(Path(case))
     content = document.read(path)
+    document.override(content, own)
     document.replace_keys(content, overrides)
     return Machine(config.case_of(path, content, cache_directory=cache_directory),
                    cache.directory(cache_directory))

@@ -57,7 +57,7 @@ class Bench:
     def _start(self, question: Question) -> Child | None:
         if self._answer(question):  # another machine of the same case was first
             return None
-        return compute_aside(question.machine.case.path, question.unbalance, self._directory)
+        return compute_aside(question.machine.case.file, question.unbalance, self._directory)
 
     def _finish(self, name: str, question: Question, child: Child) -> None:
         if not self._answer(question):

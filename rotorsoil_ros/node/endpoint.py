@@ -1,6 +1,6 @@
 """One machine on the graph: its subscriptions, its monitor and its publishers."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
 
@@ -41,7 +41,7 @@ class Watch:
 
     def __init__(
         self, node: LifecycleNode, name: str, machine: Machine, *, settings: Settings,
-        log: RunLog, diagnostics: LifecyclePublisher, bench: Bench,
+        log: RunLog, diagnostics: LifecyclePublisher, bench: Bench, sinks: Sequence[Sink] = (),
     ) -> None:
         self.name = name
         self.is_active = False
@@ -50,7 +50,7 @@ class Watch:
         self._settings = settings
         self._subscriptions: list[Any] = []
         self._numbered: dict[str, Numbered] = {}
-        self._log, self._bench = log, bench
+        self._log, self._bench, self._others = log, bench, sinks
         self._arrival = Arrival(lambda: int(node.get_clock().now().nanoseconds))
         self._topics = self._publish(diagnostics)
         self._shown_channels = machine.table.channels
@@ -59,7 +59,7 @@ class Watch:
                                judging=settings.judging(name, machine.case),
                                oils=machine.oils)
         self._raw_topics: dict[str, str] = {}
-        self._speed = settings.speed(name)
+        self._speed = settings.speed(name, machine.case)
         try:
             self._hearing = Hearing(node, name, self._speed, self._hear_speed)
         except InputError as error:
@@ -124,7 +124,7 @@ class Watch:
     def _sinks(self) -> list[Sink]:
         encoder = Encoder(self.name, self._machine.table.channels, self._topics)
         outlets = [self._send, self._log.write] if self._log.is_written else [self._send]
-        sinks: list[Sink] = [Messenger(encoder, outlets), self._tell]
+        sinks: list[Sink] = [Messenger(encoder, outlets), self._tell, *self._others]
         return [*sinks, self._log.show] if self._is_shown and self._log.is_shown else sinks
 
     def _tell(self, event: Event) -> None:

@@ -34,6 +34,7 @@ from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
 from rotorsoil_ros.node.parameters import described, Settings
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
+from rotorsoil_ros.node.together import Together, together_of
 from rotorsoil_ros.stop import Stop
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
@@ -67,6 +68,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         super().__init__(NODE_NAME, **options)
         self.settings = Settings(self)
         self._watches: list[Watch] = []
+        self._together: list[Together] = []
         self._log: RunLog | None = None
         self._diagnostics: LifecyclePublisher | None = None
         self._bench: Bench | None = None
@@ -146,9 +148,15 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         held.callback(bench.close)
         diagnostics = self.create_lifecycle_publisher(DiagnosticArray, DIAGNOSTICS_TOPIC, OUTPUT)
         held.callback(self.destroy_lifecycle_publisher, diagnostics)
+        self._together = [Together(self, plant, names, machines[names[0]].table.channels, log=log,
+                                   diagnostics=diagnostics)
+                          for plant, names in together_of(machines)]
+        for together in self._together:
+            held.callback(together.destroy)
         for name, machine in machines.items():
             watch = Watch(self, name, machine, settings=settings, log=log,
-                          diagnostics=diagnostics, bench=bench)
+                          diagnostics=diagnostics, bench=bench, sinks=[
+                              one for one in self._together if one.adds(name)])
             held.callback(watch.destroy)
             self._watches.append(watch)
         self._hand_out(settings.unknown())
@@ -180,6 +188,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         self.settings.is_locked = False
         self._turn = 0
         self._watches, self._log, self._diagnostics, self._bench = [], None, None, None
+        self._together = []
 
     def _log_settings(self) -> LogSettings:
         value = self.settings.value
@@ -199,6 +208,9 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
                 self._bench.step()
             if self._log is not None:
                 self._report_log(self._log)
+            for together in self._together:
+                together.tick(self._now_ns(),
+                              stale_after_s=float(self.settings.value('stale_after_s')))
         # In turns: fifty at once would keep the speeds of all waiting.
         self._watches[turn].tick(
             self._now_ns(), stale_after_s=float(self.settings.value('stale_after_s')),

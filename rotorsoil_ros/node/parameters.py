@@ -24,6 +24,7 @@ from rclpy.parameter import Parameter
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.loading import cases_of
+from rotorsoil_ros.case.plant.together import sources_of
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.rules import Judging, Matching
 from rotorsoil_ros.units import rpm_to_rad_s, SPEED_UNITS
@@ -274,26 +275,34 @@ class Settings:
         return names
 
     def case_file(self, machine: str) -> Path:
-        """Return the case file of a machine."""
-        path = self.value(f'{machine}.case')
+        """Return the case file of a machine; of several in it that of its name, or `FILE#NAME`."""
+        path, mark, source = self.value(f'{machine}.case').partition('#')
         if not path:
             raise InputError(f'parameter {machine}.case: must be the path of a case file')
         shipped = SHIPPED / f'{path}.yaml'
-        return shipped if re.fullmatch(r'\w+', path) and shipped.is_file() else (
+        file = shipped if re.fullmatch(r'\w+', path) and shipped.is_file() else (
             Path(path).expanduser())
+        if not mark and file.is_file() and machine in sources_of(file):
+            mark, source = '#', machine
+        return Path(f'{file}{mark}{source}')
 
     @property
     def cache(self) -> Path | None:
         """Directory of the cache, None for the usual one."""
         return Path(self.value('cache')).expanduser() if self.value('cache') else None
 
-    def speed(self, machine: str) -> SpeedSource:
-        """Return what tells the speed of a machine."""
+    def speed(self, machine: str, case: Case) -> SpeedSource:
+        """Return what tells the speed of a machine: of a geared one that of another."""
         said = {name: self.value(f'{machine}.speed.{name}')
                 for name in ('topic', 'type', 'field', 'unit')}
+        ratio = float(self.value(f'{machine}.speed.ratio'))
+        if case.berth is not None and case.berth.geared is not None and not said['topic']:
+            master, times = case.berth.geared
+            said |= {'topic': f'{master}/joint_states', 'type': 'sensor_msgs/msg/JointState'}
+            ratio *= times
         try:
             return SpeedSource(
-                ratio=float(self.value(f'{machine}.speed.ratio')),
+                ratio=ratio,
                 joint=self.value(f'{machine}.rotor_joint'), **said)
         except InputError as error:
             raise InputError(f'parameter {machine}.speed: {error}') from error

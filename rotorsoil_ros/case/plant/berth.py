@@ -45,6 +45,8 @@ class Berth:
         Highest speed of each neighbour [rad/s].
     remarks : tuple of str
         What looks odd about where and how it stands.
+    geared : tuple of str and float, or None
+        Which machine's speed is its own, times what [-]; None where it turns by itself.
 
     """
 
@@ -56,6 +58,7 @@ class Berth:
     rated_speed: float
     fastest: tuple[float, ...]
     remarks: tuple[str, ...] = ()
+    geared: tuple[str, float] | None = None
 
     def model(
         self, rotor: Rotor, foundations: Sequence[Foundation], soil_models: Sequence[SoilModel],

@@ -110,13 +110,14 @@ class PlantEntries:
         neighbours = tuple(
             Neighbour(rotor, place, speed) for number, (rotor, place, speed) in enumerate(
                 zip(rotors, places, speeds, strict=True)) if number != index)
-        own, name = cases[index], self.names[index]
+        own, name, ratio = cases[index], self.names[index], machines[index].ratio
         fastest = [max(speed, case.speed_range[1] if speed else 0.0)
                    for speed, case in zip(speeds, cases, strict=True)]
         berth = Berth(
             self.entries.name, places[index], neighbours, self.names, index, speeds[index],
             tuple(fastest[:index] + fastest[index + 1:]),
-            tuple(self._remarks(index, own.foundations, places[index])))
+            tuple(self._remarks(index, own.foundations, places[index])),
+            None if ratio is None else (ratio.of, ratio.times))
         couples = tuple(f'{name}_{disc}' for disc in own.couples)
         with faults.at('machines'):
             model = berth.model(rotors[index], own.foundations,

@@ -201,8 +201,9 @@ def sources_of(path: Path, overrides: Sequence[str] = ()) -> tuple[str, ...]:
 
     Nothing where the file tells of one machine, or says itself which one is meant.
     """
+    path, own = document.chosen(path)
     content = document.read(path)
-    document.override(content, overrides)
+    document.override(content, [*own, *overrides])
     if 'machines' not in content or content.get('source') is not None:
         return ()
     entries, _ = validated(PlantDocument, path, content)
