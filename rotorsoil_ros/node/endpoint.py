@@ -20,6 +20,7 @@ from rotorsoil_ros.node.numbered import Numbered
 from rotorsoil_ros.node.parameters import Settings
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
+from rotorsoil_ros.node.together import geared
 from rotorsoil_ros.units import rad_s_to_rpm
 from rotorsoil_ros.wire.dating import Arrival
 from rotorsoil_ros.wire.definitions import IMU, STRING, TEMPERATURE
@@ -59,7 +60,7 @@ class Watch:
                                judging=settings.judging(name, machine.case),
                                oils=machine.oils)
         self._raw_topics: dict[str, str] = {}
-        self._speed = settings.speed(name, machine.case)
+        self._speed = geared(settings.speed(name), machine.case)
         try:
             self._hearing = Hearing(node, name, self._speed, self._hear_speed)
         except InputError as error:

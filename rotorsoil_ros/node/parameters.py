@@ -291,18 +291,13 @@ class Settings:
         """Directory of the cache, None for the usual one."""
         return Path(self.value('cache')).expanduser() if self.value('cache') else None
 
-    def speed(self, machine: str, case: Case) -> SpeedSource:
-        """Return what tells the speed of a machine: of a geared one that of another."""
+    def speed(self, machine: str) -> SpeedSource:
+        """Return what tells the speed of a machine."""
         said = {name: self.value(f'{machine}.speed.{name}')
                 for name in ('topic', 'type', 'field', 'unit')}
-        ratio = float(self.value(f'{machine}.speed.ratio'))
-        if case.berth is not None and case.berth.geared is not None and not said['topic']:
-            master, times = case.berth.geared
-            said |= {'topic': f'{master}/joint_states', 'type': 'sensor_msgs/msg/JointState'}
-            ratio *= times
         try:
             return SpeedSource(
-                ratio=ratio,
+                ratio=float(self.value(f'{machine}.speed.ratio')),
                 joint=self.value(f'{machine}.rotor_joint'), **said)
         except InputError as error:
             raise InputError(f'parameter {machine}.speed: {error}') from error

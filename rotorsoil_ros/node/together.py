@@ -1,6 +1,7 @@
 """What the machines of one plant do together, told once a second."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 import math
 from typing import NamedTuple
 
@@ -9,13 +10,15 @@ from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.arrays import ComplexArray
+from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import Shaken
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Diagnostics, Event, Level, Predicted
 from rotorsoil_ros.node.run_log import RunLog
-from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE
+from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, ros_name
 from rotorsoil_ros.wire.messages import diagnostic_array, JointStateWriter, Records
+from rotorsoil_ros.wire.speeds import SpeedSource
 
 
 class _Part(NamedTuple):
@@ -112,6 +115,15 @@ def together_of(machines: Mapping[str, Machine]) -> Iterator[tuple[str, tuple[st
     for (plant, _), names in plants.items():
         if len(names) > 1:
             yield str(plant), tuple(names)
+
+
+def geared(source: SpeedSource, case: Case) -> SpeedSource:
+    """Return what tells the speed of a machine: of a geared one its master, unless it is said."""
+    if case.berth is None or case.berth.geared is None or source.topic:
+        return source
+    master, times = case.berth.geared
+    return replace(source, topic=f'{master}/joint_states', type=ros_name(JOINT_STATE),
+                   ratio=times * source.ratio)
 
 
 def _values(found: Shaken) -> Iterator[tuple[str, float | str]]:
