@@ -91,7 +91,7 @@ def test_block_on_layers_by_its_shape_is_stiffer_than_its_discs_by_what_check_sa
                   for machine in (thin, by_shape))
     assert abs(one / other - 1.0) == pytest.approx(shape.share, rel=1e-2)
     assert 0.05 < shape.share < 0.2
-    assert 'on these layers: within 0.5%' in dict(
+    assert 'on these layers: within 0.6%' in dict(
         derived_quantities(by_shape.case, by_shape.model.soil_models))['block: model error']
     # Light modes below the cut-off of the layer, by pieces as on discs.
     speeds = [[one.speed for one in machine.critical_speeds()] for machine in (thin, by_shape)]

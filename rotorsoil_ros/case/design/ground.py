@@ -69,7 +69,7 @@ def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) ->
     if support == BOUNDARY_ELEMENTS:
         alone = len(case.foundations) == 1 and not isinstance(contact, Plan)
         where = '' if case.ground is None else ' on these layers'
-        return f'boundary elements of this plan{where}: within {0.5 if alone else 1.0:g}%'
+        return f'boundary elements of this plan{where}: within {0.6 if alone else 1.0:g}%'
     if support not in _BY_DISCS or case.support.geometry != 'disc':
         return ''
     parts = ['thin layers under a disc: within 0.1%'] if support == THIN_LAYERS else []

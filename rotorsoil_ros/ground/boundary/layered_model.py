@@ -24,7 +24,7 @@ from rotorsoil_ros.ground.layers.table import LayeredTable
 from rotorsoil_ros.ground.soil import Soil
 
 # Part of every cache key: raise it when the method changes what a table says.
-LAYERED_SITE_ALGORITHM = 1
+LAYERED_SITE_ALGORITHM = 2
 
 # Waves that come back from below the uppermost layer are smooth over its thickness: elements are
 # as small as for waves of this a0 over it. A thinner one, of the shortest half side, would need

@@ -69,7 +69,8 @@ class LayeredWaves:
                                     mesh=_MESH)
         soil = ground.soils[0]
         even = SurfaceWaves.of(soil.poisson_ratio, soil.loss_factor, 1.01 * highest * reach)
-        return cls(ground, _distances(ground, reach, highest), WavePencil(line.outside), even)
+        return cls(ground, _distances(ground, reach, highest),
+                   WavePencil(line.outside, line.above_rock), even)
 
     @property
     def poisson_ratio(self) -> float:

@@ -60,7 +60,7 @@ class RigidCylinder:
 
     @cached_property
     def _outside(self) -> WavePencil:
-        return WavePencil(self.line.outside)
+        return WavePencil(self.line.outside, self.line.above_rock)
 
     @cached_property
     def _below(self) -> WavePencil:

@@ -26,6 +26,10 @@ _NEAR = 0.12
 # The half-space keeps real elements down to so many radii below the edge of the base.
 _REAL = 0.6
 
+# A wall that is welded over less than this share of its depth is that of a trench, and the element
+# at the edge of the base there [-], of a radius.
+_HARDLY_WELDED, _OF_TRENCH = 0.05, 0.0005
+
 # Points of a graded mesh closer to an interface than this share of their spacing are dropped.
 _TOO_CLOSE = 0.35
 
@@ -54,6 +58,12 @@ class LineMesh:
     ratio: float = 0.2
     per_wave: float = 0.4
     per_radius: float = 0.3
+
+    @classmethod
+    def beside(cls, embedment: Embedment) -> 'LineMesh':
+        """Return the usual mesh; beside an open trench stresses rise faster to the edge."""
+        is_open = embedment.depth > 0.0 and embedment.side_contact < _HARDLY_WELDED
+        return cls(smallest=_OF_TRENCH) if is_open else cls()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,6 +185,8 @@ class VerticalLine:
         Nodes that follow the body; the last of them is the edge of the base.
     base : float
         Depth of the base.
+    above_rock : bool
+        Whether the line ends on rock.
 
     """
 
@@ -183,6 +195,7 @@ class VerticalLine:
     depth: ComplexArray
     wall: slice
     base: float
+    above_rock: bool
 
     @classmethod
     def through(
@@ -214,7 +227,7 @@ class VerticalLine:
         order = mesh.order
         return cls(LineMatrices.assembled(pieces, keeps_last=False),
                    LineMatrices.assembled(pieces[above:], keeps_last=False), _depths(pieces),
-                   slice(order * free, order * above + 1), embedment.depth)
+                   slice(order * free, order * above + 1), embedment.depth, ground.below is None)
 
 
 def _real(

@@ -21,7 +21,7 @@ from rotorsoil_ros.ground.layers.tabulate import Radii, tabulate
 from rotorsoil_ros.ground.soil import Contact, equivalent_radii, Soil
 
 # Part of every cache key: raise it when mesh, waves or fit change what a table says.
-LAYERS_ALGORITHM = 1
+LAYERS_ALGORITHM = 2
 
 # Upper ends of tables [-]: few of them, so that grounds of another stiffness share a table.
 _ENDS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)

@@ -53,7 +53,7 @@ def exact_compliance(
 
     """
     span = span or (float(a0.min()), float(a0.max()))
-    cylinder = _cylinder(ground, embedment, radii, span, mesh or LineMesh())
+    cylinder = _cylinder(ground, embedment, radii, span, mesh or LineMesh.beside(embedment))
     return np.array([_compliance(cylinder, radii, omega) for omega in a0.tolist()])
 
 
@@ -109,7 +109,7 @@ def tabulate(
 
     """
     def solver(span: tuple[float, float]) -> tuple[SolveMany, int]:
-        cylinder = _cylinder(ground, embedment, radii, span, LineMesh())
+        cylinder = _cylinder(ground, embedment, radii, span, LineMesh.beside(embedment))
         return (lambda omega: np.array([_compliance(cylinder, radii, one)
                                         for one in omega.tolist()]), len(cylinder.line.depth))
 

@@ -8,8 +8,10 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.ground.layers.line import LineMatrices
 
-# Waves that decay by less than this share of their wavenumber are told by their energy.
-_TRAVELS = 0.1
+# Waves that decay by less than this share of their wavenumber are told by their energy: where a
+# tail ends the ground, whose error may push them across the real axis, and above rock, where only
+# round-off may. Close to a cut-off energy and decay disagree, and decay is right.
+_TRAVELS, _TRAVELS_ABOVE_ROCK = 0.1, 1e-6
 
 # A backward wave lies just below the cut of the Hankel function, by this share of itself.
 _BELOW_CUT = 1e-13
@@ -49,6 +51,8 @@ class WavePencil:
     ----------
     line : LineMatrices
         Layers between their ends; what is held is left out.
+    above_rock : bool
+        Whether they end on rock, not in a tail.
 
     References
     ----------
@@ -59,6 +63,7 @@ class WavePencil:
     """
 
     line: LineMatrices
+    above_rock: bool = False
 
     @cached_property
     def along(self) -> ComplexArray:
@@ -119,11 +124,12 @@ class WavePencil:
             2.0 * k * (found.u * (self.along @ found.u)
                        + found.w * (line.v_mu @ found.w)).sum(axis=0)
             + 2.0 * (found.u * (self.coupling @ found.w)).sum(axis=0))
-        inward = np.where(np.abs(k.imag) < _TRAVELS * np.abs(k.real), change.real < 0.0,
+        travels = _TRAVELS_ABOVE_ROCK if self.above_rock else _TRAVELS
+        inward = np.where(np.abs(k.imag) < travels * np.abs(k.real), change.real < 0.0,
                           k.imag > 0.0)
         sign = np.where(inward, -1.0, 1.0)
         q = found.q
-        across = np.where(np.abs(q.imag) < _TRAVELS * np.abs(q.real), q.real < 0.0, q.imag > 0.0)
+        across = np.where(np.abs(q.imag) < travels * np.abs(q.real), q.real < 0.0, q.imag > 0.0)
         return Waves(_below_cut(k * sign), found.u, found.w * sign,
                      _below_cut(np.where(across, -q, q)), found.v)
 
