@@ -10,7 +10,10 @@ wall clock and by processor time, which says the same on a machine with as many 
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+import os
 from pathlib import Path
 import resource
 import tempfile
@@ -18,7 +21,7 @@ import time
 
 import numpy as np
 
-from rotorsoil_ros.bags.archive import Book, predict_many
+from rotorsoil_ros.bags.archive import Book, Job, predict_many, Record
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.bags.workers import processes
@@ -41,12 +44,20 @@ def profiles(directory: Path, bags: int, speeds: int) -> list[Path]:
 Seconds = tuple[float, float]  # wall clock, and processor time of this process and its children
 
 
+def of_living_children() -> float:
+    """Return what processes have spent that have not ended, and theirs that have [s]."""
+    found = [pid for task in Path('/proc/self/task').iterdir()
+             for pid in (task / 'children').read_text().split()]
+    fields = [Path(f'/proc/{pid}/stat').read_text().rsplit(')', 1)[1].split() for pid in found]
+    return sum(int(ticks) for each in fields for ticks in each[11:15]) / os.sysconf('SC_CLK_TCK')
+
+
 def timed(call: Callable[[], None]) -> Seconds:
     """Return how long a call takes."""
     def spent() -> float:
         used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF,
                                                     resource.RUSAGE_CHILDREN)]
-        return sum(each.ru_utime + each.ru_stime for each in used)
+        return sum(each.ru_utime + each.ru_stime for each in used) + of_living_children()
 
     wall, processor = time.perf_counter(), spent()
     call()
@@ -63,9 +74,24 @@ def loop(machine: Machine, paths: list[Path]) -> None:
 
 def archived(machine: Machine, paths: list[Path], out: Path, number: int) -> None:
     """Answer all bags in processes, from their start to their end."""
-    for record in predict_many(machine, paths, out, map=processes(number),
+    def mapped(function: Callable[[Job], Record], jobs: Iterable[Job], /) -> Iterator[Record]:
+        for record in processes(number)(partial(with_peak, function), jobs):
+            PEAKS.append(record.counts.pop('peak_kib', 0))
+            yield record
+
+    for record in predict_many(machine, paths, out, map=mapped,
                                has_predictions=False, has_statistics=True):
         assert not record.failure, record.failure
+
+
+PEAKS: list[int] = []
+
+
+def with_peak(function: Callable[[Job], Record], job: Job) -> Record:
+    """Answer one bag; tell among its counts how much memory the process has had [KiB]."""
+    record = function(job)
+    counts = {**record.counts, 'peak_kib': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}
+    return replace(record, counts=counts)
 
 
 def main() -> None:
@@ -85,9 +111,11 @@ def main() -> None:
         print(f'{wanted.bags} bags of {wanted.speeds} speeds, statistics only')
         print(f'  plain loop: {plain[0]:.2f} s, {plain[1]:.2f} s of processors, '
               f'{number / plain[1]:.3g} speeds/s and core')
-        start_up = timed(lambda: archived(machine, tiny, place / 'out_0', 2))
-        print(f'  start-up of two processes: {start_up[0]:.2f} s, {start_up[1]:.2f} s of '
-              'processors')
+        for number_of, what in enumerate(('the first', 'the next')):
+            start_up = timed(lambda out=f'out_0_{number_of}': archived(
+                machine, tiny, place / out, 2))
+            print(f'  start-up of {what} two processes: {start_up[0]:.2f} s, '
+                  f'{start_up[1]:.2f} s of processors')
         for jobs in (1, 2):
             wall, processor = timed(
                 lambda jobs=jobs: archived(machine, paths, place / f'out_{jobs}', jobs))
@@ -98,8 +126,7 @@ def main() -> None:
         again = list(predict_many(machine, paths, place / 'out_2', has_predictions=False,
                                   has_statistics=True))
         print(f'  known already: {1e3 * (time.perf_counter() - start) / len(again):.2f} ms a bag')
-        mib = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-        print(f'  memory of the largest process: {mib:.0f} MiB')
+        print(f'  memory of the largest process: {max(PEAKS) / 1024:.0f} MiB')
 
 
 if __name__ == '__main__':

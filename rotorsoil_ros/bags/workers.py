@@ -3,12 +3,18 @@
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from contextlib import contextmanager
+from multiprocessing import get_all_start_methods, get_context
+from multiprocessing.forkserver import ensure_running
+import os
 from typing import Any
 
 from rotorsoil_ros.background import Mapper
 from rotorsoil_ros.bags.archive import Job, Record
 from rotorsoil_ros.errors import InputError
+
+ENGINE = 'rotorsoil_ros.bags.archive'  # and all that it needs
+THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
 
 Answers = Callable[[Job], Record]
 
@@ -45,9 +51,34 @@ def processes(number: int) -> Mapper[Job, Record]:
 
 
 def pool_of(number: int) -> ProcessPoolExecutor:
-    """Return processes that know nothing of this one."""
-    # A fork of a process that has threads, as numpy's may be, can hang.
-    return ProcessPoolExecutor(number, mp_context=get_context('spawn'))
+    """
+    Return processes that know nothing of this one.
+
+    Where the system can, one process imports the engine, once, and becomes each of them, also
+    those of the next pool; else each imports it.
+    """
+    if 'forkserver' not in get_all_start_methods():
+        return ProcessPoolExecutor(number, mp_context=get_context('spawn'))
+    context = get_context('forkserver')
+    context.set_forkserver_preload([ENGINE])
+    with _one_thread():
+        ensure_running()
+    return ProcessPoolExecutor(number, mp_context=context)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Have a process start with one thread: what has several, as numpy may, can hang in a fork."""
+    given = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, '1'))
+    try:
+        yield
+    finally:
+        for name, value in given.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _alone(function: Answers, job: Job) -> None:

@@ -18,7 +18,7 @@ from rotorsoil_ros.bags.feed import Inputs
 from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.profile import write_speed_profile
 from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
-from rotorsoil_ros.bags.workers import processes
+from rotorsoil_ros.bags.workers import ENGINE, pool_of, processes, THREADS
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.errors import InputError
@@ -296,3 +296,12 @@ def test_a_cluster_answers(fan, tmp_path):
         records = list(predict_many(
             fan, bags, tmp_path / 'out', map=cluster(workers.scheduler_address)))
     assert [record.counts['answered'] for record in records] == [50, 50, 50]
+
+
+def test_processes_come_with_the_engine_with_one_thread_and_without_ros(monkeypatch):
+    monkeypatch.delenv('MKL_NUM_THREADS', raising=False)
+    said = (f'[name in __import__("sys").modules for name in ({ENGINE!r}, "rclpy")], '
+            f'[__import__("os").environ.get(name) for name in {THREADS}]')
+    with pool_of(1) as pool:
+        assert pool.submit(eval, said).result() == ([True, False], ['1', '1', '1'])
+    assert 'MKL_NUM_THREADS' not in os.environ
