@@ -6,13 +6,14 @@ import socket
 
 from asyncua import Client, ua
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+from asyncua.server.internal_server import InternalServer
 import numpy as np
 import pytest
 
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.feeds.address_space import NAMESPACE, STATUS
-from rotorsoil_ros.feeds.opcua import OpcUaOutlet, OpcUaSettings
+from rotorsoil_ros.feeds.opcua import LIMITS, OpcUaOutlet, OpcUaSettings
 from rotorsoil_ros.feeds.points import Quality
 
 from brokers import certified
@@ -330,3 +331,8 @@ def test_files_that_are_no_certificate_are_told_in_one_line(certificates, given,
         OpcUaOutlet(OpcUaSettings(
             ANYWHERE, **{name: folder / value for name, value in whole.items()}))
     assert '\n' not in str(told.value)
+
+
+def test_the_library_has_every_limit_that_is_set():
+    server = InternalServer()
+    assert all(getattr(server, limit) > most for limit, most in LIMITS.items())
