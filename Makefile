@@ -53,7 +53,7 @@ $(INSTALLED): setup.py
 	fi; \
 	echo "installing into .venv with $$($$chosen --version): some minutes, once"; \
 	$$chosen -m venv --clear .venv
-	$(BIN)/python $(INSTALL) -e '.[ros,test,viewer]'
+	$(BIN)/python $(INSTALL) -e '.[broker,ros,test,viewer]'
 	@touch $@
 
 $(DOCUMENTED): $(INSTALLED)

@@ -49,6 +49,8 @@ setup(
     extras_require={
         # ROSS brings plotly of another age along: an environment of its own is the best place.
         'bench': ['plotly<6', 'ross-rotordynamics>=2.3'],
+        # For the tests, where mosquitto is not installed; it wants younger libraries than ours do.
+        'broker': ['amqtt>=0.12'],
         'cluster': ['distributed>=2024.1'],
         'docs': [
             'furo>=2024.8.6',
@@ -70,7 +72,6 @@ setup(
         'viewer': ['rerun-sdk>=0.38'],
         'zenoh': ['eclipse-zenoh>=1.2'],
         'test': [
-            'amqtt>=0.12',
             'asyncua>=2.0',
             'cyclonedds>=11.0; sys_platform == "linux" and platform_machine == "x86_64"',
             'distributed>=2024.1',

@@ -14,6 +14,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
+import pytest
 
 from rotorsoil_ros.feeds.sparkplug import parse
 
@@ -33,6 +34,8 @@ class Broker:
         self.start()
 
     def start(self):
+        if not MOSQUITTO:
+            pytest.importorskip('amqtt', reason='neither mosquitto nor amqtt is installed')
         command = self._mosquitto() if MOSQUITTO else self._amqtt()
         self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL,
                                          stderr=subprocess.DEVNULL)

@@ -28,7 +28,7 @@ Read = TypeVar('Read')
 
 APPLICATION_URI = 'urn:rotorsoil_ros:feed'
 # What is kept for a client that subscribes and does not fetch: the last values, for ten minutes.
-LIMITS = {'max_subscriptions': 200, 'max_unacked_messages_per_subscription': 100,
+MOST_KEPT = {'max_subscriptions': 200, 'max_unacked_messages_per_subscription': 100,
           'max_monitored_item_queue_size': 10, 'max_lifetime_count': 6000}
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 MOST_OTHERS = 0o077  # of the permissions of a file with passwords
@@ -150,7 +150,7 @@ class OpcUaOutlet:
 
     async def _prepared(self) -> Server:
         settings, server = self._settings, Server(user_manager=self)
-        for limit, most in LIMITS.items():
+        for limit, most in MOST_KEPT.items():
             setattr(server.iserver, limit, most)
         await server.init()
         server.set_endpoint(settings.endpoint)

@@ -13,7 +13,7 @@ import pytest
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.feeds.address_space import NAMESPACE, STATUS
-from rotorsoil_ros.feeds.opcua import LIMITS, OpcUaOutlet, OpcUaSettings
+from rotorsoil_ros.feeds.opcua import MOST_KEPT, OpcUaOutlet, OpcUaSettings
 from rotorsoil_ros.feeds.points import Quality
 
 from brokers import certified
@@ -335,4 +335,4 @@ def test_files_that_are_no_certificate_are_told_in_one_line(certificates, given,
 
 def test_the_library_has_every_limit_that_is_set():
     server = InternalServer()
-    assert all(getattr(server, limit) > most for limit, most in LIMITS.items())
+    assert all(getattr(server, limit) > most for limit, most in MOST_KEPT.items())
