@@ -60,7 +60,7 @@ setup(
             'ziamath>=0.12',
         ],
         'bags': ['rosbags>=0.11.0'],
-        'mqtt': ['paho-mqtt>=2.0', 'protobuf>=4.22'],
+        'mqtt': ['paho-mqtt>=2.0', 'protobuf>=4.25'],
         'opcua': ['asyncua>=2.0'],
         'frames': ['pandas>=2.0', 'xarray>=2023.6'],
         'ros': [
@@ -82,7 +82,7 @@ setup(
             'openpyxl>=3.1.0',
             'paho-mqtt>=2.0',
             'pandas>=2.0',
-            'protobuf>=4.22',
+            'protobuf>=4.25',
             'pyarrow>=14.0.1',
             'pytest>=8.2',
             'pytest-xdist>=3.6',

@@ -36,11 +36,12 @@ class Speaker:
     @classmethod
     def of(cls, topic: str) -> tuple['Speaker', str] | None:
         """Return who speaks on a topic of ours, and which topic it is; None of any other."""
-        for name in HEARD:
-            if topic.endswith(f'/{name}') and not topic.endswith(f'/demodulated/{name}'):
-                node, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
-                return (cls(node.strip('/'), machine), name) if node and machine else None
-        return None
+        # Of `steady/amplitude` and `amplitude` the longer name is meant.
+        name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len,
+                   default='')
+        node, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
+        is_heard = name in HEARD and node and machine
+        return (cls(node.strip('/'), machine), name) if is_heard else None
 
     @property
     def name(self) -> str:

@@ -24,6 +24,8 @@ NS_IN_MS = 1_000_000
 INT32, INT64, DOUBLE, BOOLEAN, WORDS_TYPE = 3, 4, 10, 11, 12
 GOOD_CODE, STALE_CODE, BAD_CODE = 192, 500, 0
 
+# Of our own, as others may know the same schema.
+_POOL = descriptor_pool.DescriptorPool()
 _SCHEMA = {
     'Payload': ['timestamp 1 uint64', 'metrics 2 *Metric', 'seq 3 uint64', 'uuid 4 string',
                 'body 5 bytes'],
@@ -178,7 +180,7 @@ def _property(metric: Any, key: str, kind: int, **value: object) -> None:
 
 
 def _payload_class(package: str = 'rotorsoil_ros.sparkplug_b') -> Any:
-    """Return the class of payloads, in a pool of its own: others may know the same schema."""
+    """Return the class of payloads."""
     described = descriptor_pb2.FileDescriptorProto(
         name='sparkplug_b.proto', package=package, syntax='proto2')
     for name, fields in _SCHEMA.items():
@@ -187,9 +189,8 @@ def _payload_class(package: str = 'rotorsoil_ros.sparkplug_b') -> Any:
             message.oneof_decl.add(name='value')
         for field in fields:
             _field(message, *field.split(), package=package)
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(described)
-    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f'{package}.Payload'))
+    _POOL.Add(described)
+    return message_factory.GetMessageClass(_POOL.FindMessageTypeByName(f'{package}.Payload'))
 
 
 def _field(message: Any, name: str, number: str, kind: str, *, package: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Level
 from rotorsoil_ros.feeds.board import SILENCE_S
-from rotorsoil_ros.feeds.hearsay import places_in, Speaker
+from rotorsoil_ros.feeds.hearsay import HEARD, places_in, Speaker
 from rotorsoil_ros.feeds.points import OF_CHANNEL, Quality, quantities_of, unit_of
 from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, OWN_TOPICS
 
@@ -41,7 +41,7 @@ def test_a_topic_tells_who_speaks(topic, node, machine, told, name):
 
 
 @pytest.mark.parametrize('topic', [
-    '/rotorsoil/fan/demodulated/amplitude', '/amplitude', '/fan/amplitude_x', '/diagnostics', ''])
+    *(f'/rotorsoil/fan/{name}' for name in OWN_TOPICS if name not in HEARD), '/amplitude', '/fan/amplitude_x', '/diagnostics', ''])
 def test_other_topics_are_nobodys(topic):
     assert Speaker.of(topic) is None
 
@@ -64,7 +64,7 @@ def test_every_value_of_every_channel_is_there_before_the_first_speed(plant, mac
 
 
 def test_a_value_is_that_of_the_prediction_at_the_stamp_of_the_speed(plant):
-    plant.turns(1.0, 150.0, RUNNING)
+    plant.turns(1.0, RUNNING, RUNNING)
     seen, vector = plant.at(), plant.expected(X, RUNNING)
     told = {name: seen.points[X, name] for name in ('Amplitude', 'Phase', 'VelocityRms')}
     assert told['Amplitude'].value == pytest.approx(abs(vector), rel=1e-14)
