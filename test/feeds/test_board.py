@@ -41,7 +41,8 @@ def test_a_topic_tells_who_speaks(topic, node, machine, told, name):
 
 
 @pytest.mark.parametrize('topic', [
-    *(f'/rotorsoil/fan/{name}' for name in OWN_TOPICS if name not in HEARD), '/amplitude', '/fan/amplitude_x', '/diagnostics', ''])
+    *(f'/rotorsoil/fan/{name}' for name in OWN_TOPICS if name not in HEARD),
+    '/amplitude', '/fan/amplitude_x', '/diagnostics', ''])
 def test_other_topics_are_nobodys(topic):
     assert Speaker.of(topic) is None
 
