@@ -56,6 +56,14 @@ class States:
     left: ComplexArray
     right: ComplexArray
 
+    def beside(self, constant: ComplexArray) -> 'States':
+        """Return the same with motions behind it that give way by constants, (k,)."""
+        count = len(constant)
+        return States(
+            scipy.linalg.block_diag(self.constant, np.diag(constant)), self.poles,
+            np.concatenate([self.left, np.zeros((count, len(self.poles)))]),
+            np.concatenate([self.right, np.zeros((len(self.poles), count))], axis=1))
+
 
 @dataclass(frozen=True)
 class RationalMatrix:

@@ -262,6 +262,11 @@ class Support:
     def _size(self) -> int:
         return len(self.pedestal_axes) + sum(map(len, self.motions))
 
+    @property
+    def elastic(self) -> int:
+        """How many of the motions of the support, the last, are on unit springs of their own."""
+        return self._size - self.contacts - len(self.pedestal_axes)
+
     @cached_property
     def point_motion(self) -> FloatArray:
         """Motion of seats, contacts and probes per motion of the support, (p, s)."""
@@ -304,11 +309,9 @@ class Support:
         return total
 
     def motion_compliance(self, omega: FloatArray) -> ComplexArray:
-        """Return the compliance of soils, pedestals, unit springs without mass, (n, s, s)."""
+        """Return the compliance of soils and pedestals without mass, (n, c, c)."""
         axes = np.array(self.pedestal_axes, dtype=int)
-        elastic = self._size - self.contacts - len(axes)
-        return _side_by_side([self.ground(omega), self.pedestals(omega)[:, axes[:, None], axes],
-                              np.broadcast_to(np.eye(elastic), (len(omega), elastic, elastic))],
+        return _side_by_side([self.ground(omega), self.pedestals(omega)[:, axes[:, None], axes]],
                              len(omega))
 
     def answers(self, omega: float) -> bool:

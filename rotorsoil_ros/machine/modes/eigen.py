@@ -7,6 +7,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.continuation import Continuation
+from rotorsoil_ros.machine.modes.elastic import Elastic
 from rotorsoil_ros.rotor.whirl import ORBITS
 
 # Frequencies w = lambda / i with less real part than this share of |w| do not vibrate: they
@@ -58,6 +59,8 @@ class FreeVibration:
         Frequency up to which modes are looked for [rad/s].
     reach : float
         Rotor modes up to this many times `highest` are unknowns of their own.
+    elastic : Elastic
+        What bends of its foundations; forces act on it where they act on the housings.
     within : tuple of two (n,) float arrays
         Frequencies between which all this holds [rad/s].
 
@@ -70,6 +73,7 @@ class FreeVibration:
     rows: FloatArray
     mass: FloatArray
     spring: ComplexArray
+    elastic: Elastic
     compliance: Continuation
     highest: float
     reach: float
@@ -130,6 +134,28 @@ class FreeVibration:
         flat = self._gains(frequency) @ self._residues
         return np.asarray(flat.reshape(*frequency.shape, ports, ports))
 
+    def _moves(
+        self, frequency: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """
+        Return gap and housing motion over the unknowns, housing motion and mass of the support.
+
+        What bends moves the housings by X f besides, f being the force through the bearings.
+        """
+        _, orbits, _ = self._pick(self.resonant)
+        ports = len(self.rows)
+        gives, bent, mass = self.elastic.follows(frequency)
+        rows, less = self.rows + bent, self._regular(frequency) - np.eye(ports)
+        gap = np.concatenate([
+            -np.eye(ports) - less + less @ gives,
+            np.broadcast_to(orbits[:, None], (*frequency.shape, *orbits.shape[1:])),
+            less @ rows], axis=-1)
+        if self.elastic.mass.size:
+            gap = np.linalg.solve(np.eye(ports) - less @ gives, gap)
+        housing = gives @ (gap + np.eye(ports, gap.shape[-1]))
+        housing[..., gap.shape[-1] - rows.shape[-1]:] += rows
+        return gap, housing, rows, self.mass + mass
+
     def matrix(self, frequency: ComplexArray) -> ComplexArray:
         """
         Return the matrix that is singular at an eigenvalue.
@@ -151,14 +177,10 @@ class FreeVibration:
         own = len(self.mass)
         w = frequency[..., None, None]
         one = np.eye(ports)
-        regular = self._regular(frequency)
         constant, rate, inertia = (part[:, None] for part in self.bearings)
         extra = constant + w * rate - w**2 * inertia - one
         compliance = self.compliance(frequency)
-        # Gap between journal and housing, over the unknowns.
-        gap = np.concatenate([
-            -regular, np.broadcast_to(orbits[:, None], (*frequency.shape, ports, modes)),
-            (regular - one) @ self.rows], axis=-1)
+        gap, housing, rows, mass = self._moves(frequency)
         through = gap + np.eye(ports, gap.shape[-1])
         force, mode = slice(0, ports), slice(ports, ports + modes)
         modal, motion = range(ports, ports + modes), slice(ports + modes, None)
@@ -166,11 +188,10 @@ class FreeVibration:
         # Bearings g = (Z - 1) gap; modes (1 - w / w_k) p = -S (g - Y z), S driven; support
         # z = N (Y^T (g + gap) + (w^2 M - K) z), where the compliance N may be zero.
         total[..., force, :] = np.eye(ports, gap.shape[-1]) - extra @ gap
-        total[..., mode, force] = driven[:, None]
-        total[..., modal, modal] = 1.0 - frequency[..., None] * inverse[:, None]
-        total[..., mode, motion] = -total[..., mode, force] @ self.rows
-        total[..., motion, :] = -(compliance @ self.rows.T) @ through
-        total[..., motion, motion] += np.eye(own) + compliance @ (self.spring - w**2 * self.mass)
+        total[..., mode, :] = driven[:, None] @ (np.eye(ports, gap.shape[-1]) - housing)
+        total[..., modal, modal] += 1.0 - frequency[..., None] * inverse[:, None]
+        total[..., motion, :] = -(compliance @ rows.swapaxes(-2, -1)) @ through
+        total[..., motion, motion] += np.eye(own) + compliance @ (self.spring - w**2 * mass)
         return total
 
     def pencil(self) -> tuple[ComplexArray, ComplexArray]:
@@ -185,8 +206,12 @@ class FreeVibration:
         inverse, orbits, driven = self._pick(slow)
         constant, linear, inertia = self.bearings
         length, ports, modes = orbits.shape
-        own, heavy = len(self.mass), ports if inertia.any() else 0
-        soil_states = self.compliance.states(_ROUGH)
+        limit = self.reach * self.highest
+        rows, mass, spring, gives = self.elastic.joined(
+            self.rows, self.mass, self.spring, highest=limit)
+        own, heavy = len(mass), ports if inertia.any() else 0
+        soil_states = self.compliance.states(_ROUGH).beside(
+            1.0 / self.elastic.spring[self.elastic.slow(limit)])
         sizes = (ports, modes, own, own, len(soil_states.poles), own, ports, heavy)
         ends = np.cumsum(sizes)
         force, mode, motion, load, soil, rate, gap, swing = (
@@ -200,20 +225,22 @@ class FreeVibration:
         a[:, force, gap], b[:, force, gap] = np.eye(ports) - constant, linear
         b[:, force, swing] = -middle * inertia[..., :heavy]
         a[:, swing, swing], b[:, swing, gap] = np.eye(heavy), np.eye(heavy, ports) / middle
-        a[:, mode, force], a[:, modal, modal] = driven, 1.0
-        a[:, mode, motion] = -a[:, mode, force] @ self.rows
+        # Of what bends fast there is its static answer to the force through the bearings.
+        a[:, mode, force], a[:, modal, modal] = driven @ (np.eye(ports) - gives), 1.0
+        a[:, mode, gap], a[:, mode, motion] = -driven @ gives, -driven @ rows
         b[:, modal, modal] = inverse
         a[:, motion, motion], a[:, motion, load] = np.eye(own), -soil_states.constant
         a[:, motion, soil] = -soil_states.left
-        a[:, load, force] = a[:, load, gap] = -self.rows.T
-        a[:, load, load], a[:, load, motion] = np.eye(own), self.spring
-        b[:, load, motion] = self.rows.T @ first @ self.rows
-        b[:, load, rate] = middle * (self.mass + self.rows.T @ second @ self.rows)
+        a[:, load, force] = a[:, load, gap] = -rows.T
+        a[:, load, load], a[:, load, motion] = np.eye(own), spring
+        b[:, load, motion] = rows.T @ first @ rows
+        b[:, load, rate] = middle * (mass + rows.T @ second @ rows)
         a[:, soil, load], a[:, soil, soil] = soil_states.right, np.diag(soil_states.poles)
         b[:, soil, soil] = np.eye(len(soil_states.poles))
         a[:, rate, rate], b[:, rate, motion] = np.eye(own), np.eye(own) / middle
-        a[:, gap, force], a[:, gap, mode], a[:, gap, gap] = static, -orbits, np.eye(ports)
-        a[:, gap, motion] = (np.eye(ports) - static) @ self.rows
+        less = np.eye(ports) - static
+        a[:, gap, force], a[:, gap, mode] = static + less @ gives, -orbits
+        a[:, gap, gap], a[:, gap, motion] = np.eye(ports) + less @ gives, less @ rows
         return a, b
 
     @cached_property
@@ -317,11 +344,19 @@ class FreeVibration:
         along = (vector.conj() * change).sum(axis=-1)
         return shift - 1.0 / along, change / along[..., None]
 
+    def bent(self, frequency: ComplexArray, vector: ComplexArray) -> ComplexArray:
+        """Return the elastic coordinates of the foundations, (n, p, e)."""
+        gap, _, _, _ = self._moves(frequency)
+        through = (gap @ vector[..., None])[..., 0] + vector[..., :len(self.rows)]
+        return self.elastic.motion(
+            frequency, through, vector[..., vector.shape[-1] - len(self.mass):])
+
     def amplitudes(self, frequency: ComplexArray, vector: ComplexArray) -> ComplexArray:
         """Return the amplitudes of all rotor modes, forward then backward, (n, p, m)."""
         _, _, driven = self._modes
         ports, modes = len(self.rows), self.resonant.shape[1]
-        load = vector[..., ports + modes:] @ self.rows.T - vector[..., :ports]
+        _, housing, _, _ = self._moves(frequency)
+        load = (housing @ vector[..., None])[..., 0] - vector[..., :ports]
         forced = self._gains(frequency) * (load @ driven.transpose(0, 2, 1))
         np.put_along_axis(forced, self.resonant[:, None],
                           vector[..., ports:ports + modes], axis=2)

@@ -222,7 +222,7 @@ def feeds(pencil: Pencil, vibrations: Vibrations, index: int) -> tuple[Feed, ...
         (bearing.name, _OF_BEARING, _taken(w, gap[pair], bearing, vibrations.speed) / spring)
         for bearing, spring, pair in zip(model.rotor.bearings, model.nominal_springs.tolist(),
                                          _pairs(0), strict=False)]
-    deflection = support * pencil.compliance.size
+    deflection = support * pencil.size
     terms += [(f'the pedestal of {bearing.name}', _OF_BEARING, _passive(
         w, deflection[pair], bearing.pedestal.stiffness, bearing.pedestal.damping))
         for bearing, pair in zip((one for one in model.rotor.bearings

@@ -109,7 +109,8 @@ def _vibrations(
     within: tuple[float, float],
 ) -> tuple[FloatArray, ComplexArray]:
     """Return what vibrates between two frequencies, as `natural_frequencies`."""
-    size, unit, soil = compliance.size, 0.5 * span[1], compliance.states(_NOISE)
+    unit, soil = 0.5 * span[1], compliance.states(_NOISE).beside(np.ones(support.elastic) + 0j)
+    size = np.append(compliance.size, np.ones(support.elastic))
     rows = support.motion_rows * size
     mass = size[:, None] * support.motion_mass * size + rows.T @ carried @ rows
     spring = size[:, None] * support.motion_spring * size

@@ -106,7 +106,13 @@ class Pencil:
 
     @cached_property
     def _soil(self) -> States:
-        return self.compliance.states(_NOISE)
+        return self.compliance.states(_NOISE).beside(
+            np.ones(self.model.support.elastic) + 0j)
+
+    @cached_property
+    def size(self) -> FloatArray:
+        """Typical size of the motions of the support, (s,)."""
+        return np.append(self.compliance.size, np.ones(self.model.support.elastic))
 
     @cached_property
     def unit(self) -> float:
@@ -127,18 +133,18 @@ class Pencil:
         """Motion of the housings per motion of the support, (2 b, s)."""
         unit = np.repeat(np.sqrt(self.model.nominal_springs), 2)
         return np.asarray(unit[:, None] * self.model.support.motion_rows
-                          * self.compliance.size)
+                          * self.size)
 
     @cached_property
     def mass(self) -> FloatArray:
         """Mass of the support, (s, s)."""
-        size = self.compliance.size
+        size = self.size
         return np.asarray(size[:, None] * self.model.support.motion_mass * size)
 
     @cached_property
     def _spring(self) -> ComplexArray:
         """Stiffness of the support beside its compliance, (s, s)."""
-        size = self.compliance.size
+        size = self.size
         return np.asarray(size[:, None] * self.model.support.motion_spring * size)
 
     @cached_property

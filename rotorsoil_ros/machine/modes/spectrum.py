@@ -13,6 +13,7 @@ from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
+from rotorsoil_ros.machine.modes.elastic import Elastic
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of
 from rotorsoil_ros.rotor.losses import Losses, WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.reduced import ReducedRotor, Whirls
@@ -297,18 +298,19 @@ class SpectrumSolver:
         turn, half = amplitude.transpose(0, 1, 3, 2), amplitude.shape[3]
         rotor = np.stack([states[..., :half] @ turn[:, 0], states[..., half:] @ turn[:, 1]],
                          axis=2)
-        support = vector[..., vector.shape[2] - len(vibration.mass):]
+        support = np.concatenate([
+            vector[..., vector.shape[2] - len(vibration.mass):] * vibration.compliance.size,
+            vibration.bent(np.where(exists, frequency, 0.0), vector) @ self._turn.T], axis=-1)
         moving = np.sqrt(basis.mass) * rotor
         forward, backward = (np.abs(moving) ** 2).sum(axis=-1).transpose(2, 0, 1)
-        values, axes = np.linalg.eigh(vibration.mass)
+        values, axes = np.linalg.eigh(self.model.support.motion_mass)
         below = support @ (axes * np.sqrt(np.maximum(values, 0.0)))
         # Explicitly: -1 cannot be told where there is no mode at all.
         moving = moving.reshape(*exists.shape, math.prod(moving.shape[2:]))
         shape = np.concatenate([moving, below], axis=-1)
         return Spectrum(
             frequency, np.where(exists, np.where(forward >= backward, 1, -1), 0),
-            np.where(exists[..., None], shape, np.nan), rotor, support * vibration.compliance.size,
-            untold)
+            np.where(exists[..., None], shape, np.nan), rotor, support, untold)
 
     def _at(
         self, speed: FloatArray, whirls: Whirls,
@@ -322,12 +324,30 @@ class SpectrumSolver:
         unit = np.repeat(unit, 2)
         constant, rate, inertia = (part / (unit[:, None] * unit)
                                    for part in model.bearings.series(speed, zone.between))
+        own, mass, turn = len(size), support.motion_mass, self._turn
+        held = slice(0, own)
+        spring = np.diagonal(turn.T @ support.motion_spring[own:, own:] @ turn)
+        elastic = Elastic(
+            unit[:, None] * support.motion_rows[:, own:] @ turn,
+            size[:, None] * mass[:own, own:] @ turn,
+            np.diagonal(turn.T @ mass[own:, own:] @ turn), 1.0 + spring)
         return FreeVibration(
             inverse, journals @ right, journals @ left.swapaxes(2, 3), (constant, rate, inertia),
-            unit[:, None] * support.motion_rows * size,
-            size[:, None] * support.motion_mass * size,
-            size[:, None] * support.motion_spring * size, zone.compliance, self.span[1], reach,
-            zone.ends(zone.told, speed))
+            unit[:, None] * support.motion_rows[:, held] * size,
+            size[:, None] * mass[held, held] * size,
+            size[:, None] * support.motion_spring[held, held] * size, elastic, zone.compliance,
+            self.span[1], reach, zone.ends(zone.told, speed))
+
+    @cached_property
+    def _turn(self) -> FloatArray:
+        """
+        Elastic coordinates of the support between which there is no mass, by columns, (e, e).
+
+        What several losses would join them by is left out: of each is kept what it loses itself.
+        """
+        own = len(self.model.support.motion_mass) - self.model.support.elastic
+        _, turn = np.linalg.eigh(self.model.support.motion_mass[own:, own:])
+        return np.asarray(turn)
 
 
 def _merged(parts: list[Spectrum], count: int) -> Spectrum:

@@ -28,6 +28,7 @@ from rotorsoil_ros.machine.damping import DampingSplitter, SOIL, STRUCTURE
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, FlexibleBody, SEAT
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.natural import natural_frequencies
+from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.bearing import Bearing
 
@@ -105,8 +106,9 @@ def test_motion_of_the_support_says_the_same_as_its_receptance(which, request):
     """The coordinates that modes are found in, solved with forces."""
     body = request.getfixturevalue(which)
     support = (frame_support if which == 'frame' else raft_support)(body)
-    gives, mass, spring = (support.motion_compliance(SOME), support.motion_mass,
-                           support.motion_spring)
+    mass, spring = support.motion_mass, support.motion_spring
+    gives = np.array([scipy.linalg.block_diag(one, np.eye(support.elastic))
+                      for one in support.motion_compliance(SOME)])
     square = SOME[:, None, None] ** 2
     moves = np.linalg.solve(np.eye(len(mass)) + gives @ (spring - square * mass), gives)
     found = support.motion_rows @ moves @ support.motion_rows.T
@@ -264,3 +266,29 @@ def test_contact_that_forces_cannot_tell_apart_is_refused(raft):
     bare = replace(raft, residual=0.0 * raft.residual)
     with pytest.raises(RotorSoilError, match='forces of the 36 contacts apart'):
         _ = raft_support(bare).motion_mass
+
+
+def test_modes_are_those_of_all_motions_together():
+    """Oracle: eigenvalues of rotor, bearings and support at rest, without any loss."""
+    body, block = on_one_contact()
+    body = replace(body, loss=np.zeros(2), residual_loss=0.0)
+    springs = Springs([4e7, 5e7, 6e7, 8e6, 7e6, 9e6], np.zeros(6), 0.0)
+    model = paper_on(body, block, springs)
+    rotor, support = model.rotor, model.support
+    bending, mass, _ = rotor.plane_matrices
+    nodes, count = len(bending), len(support.motion_mass)
+    own = count - support.elastic
+    gap = np.zeros((4, 2 * nodes + count))
+    for index, one in enumerate(rotor.bearings):
+        place = 2 * rotor.node_of(one.position)
+        gap[2 * index, place] = gap[2 * index + 1, nodes + place] = 1.0
+    gap[:, 2 * nodes:] = -support.motion_rows
+    below = support.motion_spring.real + np.diag(np.ones(count))
+    below[:own, :own] += np.diag(springs.stiffness) - np.eye(own)
+    stiffness = scipy.linalg.block_diag(bending, bending, below) + 1e9 * gap.T @ gap
+    inertia = scipy.linalg.block_diag(mass, mass, support.motion_mass)
+    inverse = scipy.linalg.eigh(inertia, stiffness, eigvals_only=True)[::-1]
+    exact = 1.0 / np.sqrt(inverse[:10])
+
+    found = np.abs(SpectrumSolver.lowest(model, np.array([1e-3]), 10).frequency[0])
+    np.testing.assert_allclose(found, exact, rtol=1e-5)
