@@ -1,6 +1,6 @@
 """The models that a case stands for, with their tables out of the cache."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 import math
@@ -22,14 +22,15 @@ from rotorsoil_ros.case.design.tables import (
     thin_layer_model,
 )
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
+from rotorsoil_ros.case.flexible.ground import bed_of
 from rotorsoil_ros.case.summary import stability_doubts, unstable
-from rotorsoil_ros.errors import solved
+from rotorsoil_ros.errors import RotorSoilError, solved
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.half_space import InfiniteElementModel
-from rotorsoil_ros.ground.layers.profile import LayeredSoil, LEAST_LOSS_FACTOR
+from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil, LEAST_LOSS_FACTOR
 from rotorsoil_ros.ground.neighbours import on_soil
-from rotorsoil_ros.ground.soil import Soil, SoilModel
+from rotorsoil_ros.ground.soil import Contact, Soil, SoilModel
 from rotorsoil_ros.machine.band import (
     depends_on_soil,
     highest_poisson_ratio,
@@ -38,6 +39,7 @@ from rotorsoil_ros.machine.band import (
     ResponseBand,
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.flexible.body import FlexibleBody
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.source import SourceModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
@@ -214,12 +216,21 @@ def _other_grounds(
     speeds = low, max(1.0, 0.5 * spread.shear_modulus_factor**0.5) * high
     grounds = [spread.ground(case.ground or LayeredSoil((), lossy), own, place)
                for own in case.embedments]
-    if case.support.model == BOUNDARY_ELEMENTS:
+    bends = any(block.body is not None for block in case.foundations)
+    if case.support.model == BOUNDARY_ELEMENTS and not bends:
         return (layered_site_model(grounds[0][0], site_of(case.foundations, case.ground_probes),
                                    cache=cache, speed_range=speeds),)
-    return tuple(thin_layer_model(ground, block.contact, embedment, cache=cache,
-                                  speed_range=speeds)
-                 for block, (ground, embedment) in zip(case.foundations, grounds, strict=True))
+    def under(ground: LayeredSoil, embedment: Embedment) -> Callable[[Contact], SoilModel]:
+        return lambda contact: thin_layer_model(ground, contact, embedment, cache=cache,
+                                                speed_range=speeds)
+
+    return tuple(bed_of(block, under(*own), _no_coupling)
+                 for block, own in zip(case.foundations, grounds, strict=True))
+
+
+def _no_coupling(body: FlexibleBody) -> SoilModel:
+    raise RotorSoilError(f'patches are coupled through a half-space only, {len(body.patches)} of '
+                         'them stand on layers')
 
 
 def _soil_at(soil: Soil, model: CoupledModel, spread: SoilSpread, place: Place) -> Soil:

@@ -26,6 +26,7 @@ from rotorsoil_ros.cli.sweeps import machine_of
 from rotorsoil_ros.cli.table import write_table
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.figures.bearings import bearing_figures
+from rotorsoil_ros.figures.bending import bending_figure
 from rotorsoil_ros.figures.damping import damping_figure
 from rotorsoil_ros.figures.modal import mass_ratios, modal_figures, polar
 from rotorsoil_ros.figures.paper import claim_numbers, paper_figures, PaperFigure, peak_numbers
@@ -74,6 +75,8 @@ def _modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, 'Figu
     except NotSolvedError as error:
         print(f'no pictures campbell, critical_shapes, damping, orbits, shapes: {case.path}: '
               f'{undecided(case, error)}', file=sys.stderr)
+    if model.support.bends:
+        yield 'bending', bending_figure(case, model)
 
 
 def _studies(
@@ -82,7 +85,7 @@ def _studies(
     predictor = table.predictor(case.unbalance)
     if case.rotor.discs and np.any(case.unbalance):
         yield 'polar', polar(case, predictor, main_peaks(case, predictor))
-        if case.support.model != 'rigid':
+        if case.support.model != 'rigid' and not model.support.bends:
             yield 'mass_ratios', mass_ratios(case, model)
 
 

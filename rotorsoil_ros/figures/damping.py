@@ -19,6 +19,7 @@ from rotorsoil_ros.machine.damping import (
     PEDESTALS,
     RADIATION,
     SOIL,
+    STRUCTURE,
     TORQUE,
 )
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
@@ -26,8 +27,8 @@ from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.units import rad_s_to_rpm
 
 _COLOURS = dict(zip(
-    (RADIATION, MATERIAL, BEARINGS, PEDESTALS, SOIL, INTERNAL, EXTERNAL, TORQUE),
-    (*COLOURS[:4], 'grey', 'firebrick', 'darkkhaki', 'black'), strict=True))
+    (RADIATION, MATERIAL, BEARINGS, PEDESTALS, SOIL, INTERNAL, EXTERNAL, TORQUE, STRUCTURE),
+    (*COLOURS[:4], 'grey', 'firebrick', 'darkkhaki', 'black', 'slategrey'), strict=True))
 _SPEEDS = 241
 _MOST_MODES = 12
 

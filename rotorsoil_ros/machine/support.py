@@ -117,16 +117,22 @@ class Support:
     @cached_property
     def places(self) -> tuple[Channel, ...]:
         """Motions of the foundations: six of each, then its patches and probes if it bends."""
-        return (*(Channel(foundation.name, '', dof)
-                  for foundation in self.foundations for dof in DOFS),
-                *(channel for part in self.members if part.is_patched
-                  for channel in part.contacts),
-                *(channel for part in self.members for channel in part.probes))
+        bodies = [(block.name, block.body) for block in self.foundations
+                  if block.body is not None]
+        patches = [channel for name, body in bodies if not body.has_one_contact
+                   for channel in body.channels(name)[0]]
+        return (*(Channel(block.name, '', dof) for block in self.foundations for dof in DOFS),
+                *patches, *self._probes)
+
+    @property
+    def _probes(self) -> list[Channel]:
+        return [channel for block in self.foundations if block.body is not None
+                for channel in block.body.channels(block.name)[1]]
 
     @property
     def transmitting(self) -> int:
         """How many of the places, the first, stand on the ground."""
-        return len(self.places) - sum(len(part.probes) for part in self.members)
+        return len(self.places) - len(self._probes)
 
     @cached_property
     def contacts(self) -> int:
@@ -139,7 +145,7 @@ class Support:
         return slice(2 * len(self.bearings), 2 * len(self.bearings) + self.contacts)
 
     @cached_property
-    def _point_indices(self) -> tuple[IntArray, ...]:
+    def point_indices(self) -> tuple[IntArray, ...]:
         """Which points of all are those of each part: seats, contacts, probes."""
         contact = 2 * len(self.bearings)
         probe = contact + self.contacts
@@ -157,7 +163,7 @@ class Support:
         count = 2 * len(self.bearings) + sum(
             len(part.contacts) + len(part.probes) for part in self.members)
         rows = np.zeros((count, 6 * len(self.members)))
-        for index, (part, own) in enumerate(zip(self.members, self._point_indices, strict=True)):
+        for index, (part, own) in enumerate(zip(self.members, self.point_indices, strict=True)):
             rows[own, 6 * index:6 * index + 6] = part.rows
         return rows
 
@@ -165,7 +171,7 @@ class Support:
         """Return the elastic motion of the points per force on them, (n, p, p)."""
         count = len(self.point_rows)
         total = np.zeros((len(omega), count, count), dtype=complex)
-        for part, own in zip(self.members, self._point_indices, strict=True):
+        for part, own in zip(self.members, self.point_indices, strict=True):
             total[:, own[:, None], own] = part.flexibility(omega)
         return total
 
@@ -272,7 +278,7 @@ class Support:
         """Motion of seats, contacts and probes per motion of the support, (p, s)."""
         rows = np.zeros((len(self.point_rows), self._size))
         for part, points, own in zip(
-                self.members, self._point_indices, self.motions, strict=True):
+                self.members, self.point_indices, self.motions, strict=True):
             rows[points[:, None], own] = part.on_contacts.rows
         return rows
 

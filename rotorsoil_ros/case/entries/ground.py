@@ -168,6 +168,11 @@ class GroundEntries:
                 raise self.faults.error('foundations', index, 'soil_under', problem=(
                     'must be winkler or each where the ground is no homogeneous half-space, got '
                     f'green with the support model {model}'))
+            if (block.soil_under == 'green' and entries.uncertainty is not None
+                    and entries.uncertainty.rock_depth is not None):
+                raise self.faults.error('uncertainty', 'rock_depth', problem=(
+                    f'must not be given where green couples the patches of {block.name} '
+                    f'(foundations.{index}) through a half-space'))
             if model == BOUNDARY_ELEMENTS and len(entries.foundations) > 1:
                 raise self.faults.error('support', 'model', problem=(
                     f'must be one that takes each foundation alone where {block.name} bends '

@@ -80,7 +80,8 @@ class FlexibleEntries:
         return Foundation(
             name=entry.name, contact=_outline(entry, body), centre_x=x, centre_y=y,
             mass=float(mass[0, 0]), centre_of_gravity_height=height,
-            inertia=(about_x, about_y, about_z), height=entry.height, body=body)
+            inertia=(about_x, about_y, about_z), height=entry.height or _drawn_height(body),
+            body=body)
 
     def _body(self, index: int, name: str, entry: schema.FlexibleEntry) -> FlexibleBody:
         """Return the body: as it came with the document, out of the cache, or from its files."""
@@ -273,25 +274,17 @@ class FlexibleEntries:
         self, index: int, entry: schema.FoundationEntry, body: FlexibleBody,
     ) -> tuple[float, float]:
         """Return where the contact is beside the shaft, after all seats were found on it."""
-        entries = self.faults.entries
-        own = {entry.name, None} if len(entries.foundations) == 1 else {entry.name}
-        bearings = [(number, bearing) for number, bearing in enumerate(entries.rotor.bearings)
-                    if bearing.foundation in own]
-        # Of each seat from the bearing, with the contact in its own frame.
-        gaps, height = [], entries.rotor.shaft_height
-        upright = entries.rotor.orientation == 'vertical'
-        across = ('x', 'y') if upright else ACROSS
-        for number, bearing in bearings:
-            with self.faults.at('rotor', 'bearings', number, entry=bearing):
-                seat = [body.seat(bearing.seat or bearing.name, axis) for axis in across][-1]
-            there = np.array(body.dofs[seat].place) - body.centre
-            here = [0.0, 0.0, height + bearing.position] if upright else [
-                0.0, bearing.position, height]
-            gaps.append(np.array(here) - there)
-        mean = np.nanmean(np.array(gaps or [np.zeros(3)]), axis=0)
-        x = entry.centre_x if 'centre_x' in entry.model_fields_set else float(mean[0])
-        y = float(mean[1]) if entry.centre_y is None else entry.centre_y
-        for (number, bearing), gap in zip(bearings, gaps, strict=True):
+        x, y = entry.centre_x, entry.centre_y
+        if self.faults.under:
+            # Among several machines seats bear their names, and places are those of the ground.
+            return x, y or 0.0
+        seats = self._seats(entry, body)
+        mean = np.nanmean(np.array([gap for _, gap in seats] or [np.zeros(3)]), axis=0)
+        if 'centre_x' not in entry.model_fields_set:
+            x = float(mean[0])
+        y = float(mean[1]) if y is None else y
+        for number, gap in seats:
+            bearing = self.faults.entries.rotor.bearings[number]
             off = np.where(np.isfinite(gap), gap - np.array([x, y, 0.0]), 0.0)
             if np.linalg.norm(off) > _OFF_SHAFT:
                 raise self.faults.error('rotor', 'bearings', number, 'seat', problem=(
@@ -299,6 +292,33 @@ class FlexibleEntries:
                     f'{_OFF_SHAFT:g} m, got {off[0]:.4g} m across, {off[1]:.4g} m along and '
                     f'{off[2]:.4g} m up from the seat to the bearing {bearing.name}'))
         return x, y
+
+    def _seats(
+        self, entry: schema.FoundationEntry, body: FlexibleBody,
+    ) -> list[tuple[int, FloatArray]]:
+        """Return which bearings stand on a body, each with the way from its seat to it, (3,)."""
+        entries = self.faults.entries
+        upright = entries.rotor.orientation == 'vertical'
+        height, across = entries.rotor.shaft_height, ('x', 'y') if upright else ACROSS
+        own = {entry.name, None} if len(entries.foundations) == 1 else {entry.name}
+        found = []
+        for number, bearing in enumerate(entries.rotor.bearings):
+            if bearing.foundation not in own:
+                continue
+            with self.faults.at('rotor', 'bearings', number, entry=bearing):
+                seat = [body.seat(bearing.seat or bearing.name, axis) for axis in across][-1]
+            here = [0.0, 0.0, height + bearing.position] if upright else [
+                0.0, bearing.position, height]
+            found.append((number, np.array(here) - (np.array(body.dofs[seat].place)
+                                                    - body.centre)))
+        return found
+
+
+def _drawn_height(body: FlexibleBody) -> float | None:
+    """Return how high a body is above its contact, by the highest probe; None without one."""
+    highest = max((body.dofs[row].place[2] for row in body.of_kind(PROBE)), default=math.nan)
+    above = highest - body.centre[2]
+    return above if above > 0.0 else None
 
 
 def _digest(path: Path) -> str:

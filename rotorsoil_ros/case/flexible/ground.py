@@ -21,7 +21,7 @@ def bed_of(
     through: Callable[[FlexibleBody], SoilModel],
 ) -> SoilModel:
     """
-    Return the ground below a foundation that bends.
+    Return the ground below a foundation, of one that bends below its patches.
 
     Parameters
     ----------
@@ -34,7 +34,8 @@ def bed_of(
 
     """
     body = foundation.body
-    assert body is not None
+    if body is None:
+        return under(foundation.contact)
     rows = body.about_centre[body.contacts]
     axes = [DOFS.index(body.dofs[index].axis) for index in body.contacts]
     if body.bed == WINKLER:

@@ -1,5 +1,6 @@
 """What a foundation that bends is, whatever it was described by: rigid motion, modes, residual."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Self
@@ -166,6 +167,15 @@ class FlexibleBody:
         """The first motion of every place of contact."""
         return tuple({self.dofs[index].station: self.dofs[index]
                       for index in reversed(self.contacts.tolist())}.values())[::-1]
+
+    def channels(self, name: str) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+        """Return its contacts, those of one place called as the body is, and its probes."""
+        def of(rows: Sequence[int], station: str = '') -> tuple[Channel, ...]:
+            return tuple(Channel(station or self.dofs[row].station, '', self.dofs[row].axis)
+                         for row in rows)
+
+        contacts = self.contacts.tolist()
+        return of(contacts, name if self.has_one_contact else ''), of(self.of_kind(PROBE))
 
     @property
     def has_one_contact(self) -> bool:

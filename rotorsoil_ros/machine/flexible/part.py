@@ -132,18 +132,16 @@ class FoundationPart:
     def _flexible(
         cls, name: str, body: FlexibleBody, seats: tuple[int, ...], mounts: Sequence['Mount'],
     ) -> 'FoundationPart':
-        contacts, probes = body.contacts.tolist(), body.of_kind(PROBE)
+        contacts, probes = body.channels(name)
+        rows = [*body.contacts.tolist(), *body.of_kind(PROBE)]
         picked = np.concatenate([*(mount.on(body) for mount in mounts),
-                                 np.eye(len(body.dofs))[[*contacts, *probes]]])
+                                 np.eye(len(body.dofs))[rows]])
         residual = picked @ body.residual @ picked.T
         # What no force acts on needs no shape of its own: it follows those of the others.
         loaded = slice(0, len(picked) - len(probes))
         springs = massless(residual[loaded, loaded], picked[loaded] @ body.static_size)
-        channels = [Channel(name if body.has_one_contact and row in contacts else
-                            body.dofs[row].station, '', body.dofs[row].axis)
-                    for row in (*contacts, *probes)]
-        return cls(seats, tuple(channels[:len(contacts)]), tuple(channels[len(contacts):]),
-                   body.mass_about_centre, picked @ body.about_centre, picked @ body.shapes,
+        return cls(seats, contacts, probes, body.mass_about_centre,
+                   picked @ body.about_centre, picked @ body.shapes,
                    np.asarray(body.stiffness * (1.0 + 1j * body.loss)),
                    np.asarray(residual / (1.0 + 1j * body.residual_loss)),
                    residual[:, loaded] @ np.linalg.pinv(springs).T,
