@@ -22,7 +22,7 @@ _MOST_MODES = 3
 _FELT = 0.2
 _SHARE = 0.08
 # Two places with a third within the ball between them are no neighbours.
-_BALL = 1.0 - 1e-6
+_BALL = 1.0 + 1e-6
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,7 @@ def _neighbours(places: FloatArray) -> Sequence[tuple[int, int]]:
             middle = 0.5 * (places[one] + places[other])
             ball = _BALL * np.linalg.norm(places[one] - middle)
             inside = np.linalg.norm(places - middle, axis=1) < ball
+            inside[[one, other]] = False
             if not inside.any():
                 found.append((one, other))
     return found
