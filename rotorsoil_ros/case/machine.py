@@ -220,7 +220,8 @@ class Machine(ModalAnswers):
         omega, speed = hz_to_rad_s(numbers('hz', hz)), rpm_to_rad_s(numbers('rpm', rpm))
         found = Transmissibility.of(self.model, omega, speed=float(speed[0]))
         holds = bool(self._growth(speed).holds(speed[:1])[0])
-        return found if holds else replace(found, ratio=np.full_like(found.ratio, math.nan))
+        return found if holds else replace(found, ratio=np.full_like(
+            found.ratio, complex(math.nan, math.nan)))
 
     def order_response(self, *, order: float, force: str, rpm: Numbers) -> Response:
         """
