@@ -261,7 +261,8 @@ class Settings:
         names = told(lambda: self.machines) or []
         files = [told(partial(self.case_file, name)) for name in names]
         for name in names:
-            told(partial(self.speed, name))
+            if not any(fault.startswith(f'parameter {name}.speed') for fault in found):
+                told(partial(self.speed, name))
         if found:
             told(lambda: cases_of(filter(None, files), cache_directory=self.cache))
             raise InputError('\n'.join(dict.fromkeys(found)))
