@@ -121,7 +121,7 @@ def predict_many(
     case: Machine | Path | str, bags: Sequence[Path | str], out: Path | str, *,
     map: Mapper['Job', Record] = map,  # noqa: A002, as every executor calls it
     has_predictions: bool = True, has_statistics: bool = False, speed: SpeedSource = USUAL,
-    cache_directory: Path | None = None,
+    cache_directory: str | Path | None = None,
 ) -> Iterator[Record]:
     """
     Answer many bags, each by itself, on any executor; yield a record for each, in their order.
@@ -146,7 +146,7 @@ def predict_many(
         Whether records hold statistics by minute and channel.
     speed : SpeedSource
         What tells the speed.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         Of tables; the user's by default.
 
     Raises

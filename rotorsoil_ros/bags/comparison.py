@@ -63,7 +63,7 @@ class Wish:
 def compare(
     log: Path | str, case: Machine | Case | Path | str | None = None,
     wish: Wish | None = None, *,
-    cache_directory: Path | None = None, progress: Progress | None = None,
+    cache_directory: str | Path | None = None, progress: Progress | None = None,
 ) -> Comparison:
     """
     Hold what a log tells of a machine against its prediction.
@@ -76,7 +76,7 @@ def compare(
         The machine, or its case file; None: the case that the log carries.
     wish : Wish
         How to compare.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         Of tables; the user's by default.
     progress : callable
         Called with the number of messages read and their total.
@@ -197,7 +197,7 @@ class _Reading:
 
 
 def _logged_case(
-    log: Path, descriptions: Descriptions, cache_directory: Path | None,
+    log: Path, descriptions: Descriptions, cache_directory: str | Path | None,
 ) -> Case:
     """Return the case that a log carries: the last, where it was reloaded."""
     for _, description in reversed(descriptions):

@@ -29,7 +29,7 @@ class BlockEntries:
     faults: Faults
     files: dict[str, str]
     speed_range: tuple[float, float] | None
-    cache_directory: Path | None
+    cache_directory: str | Path | None
     mended: frozenset[Place]
 
     def foundations(self) -> tuple[Foundation, ...] | None:

@@ -28,10 +28,10 @@ _UNREADABLE = (OSError, EOFError, KeyError, ValueError, TypeError, MemoryError, 
                zipfile.BadZipFile, zlib.error)
 
 
-def directory(chosen: Path | None = None) -> Path:
+def directory(chosen: str | Path | None = None) -> Path:
     """Return the directory of the cache: the chosen one, $ROTORSOIL_CACHE, or the user's."""
     if chosen is not None:
-        return chosen
+        return Path(chosen)
     if os.environ.get('ROTORSOIL_CACHE'):
         return Path(os.environ['ROTORSOIL_CACHE'])
     if os.environ.get('XDG_CACHE_HOME'):

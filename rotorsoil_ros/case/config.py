@@ -89,7 +89,7 @@ class Case:
         Where it stands among the machines of a plant; None alone.
     run_up : str
         Whether answers follow changes of the speed, `transient`, or not, `quasi_static`.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         Where the tables of their films lie; None is the usual one.
     content : mapping
         The document that it was built from, settings on top included.
@@ -118,7 +118,7 @@ class Case:
     oil_temperatures: tuple[float, ...] = ()
     berth: Berth | None = None
     run_up: str = 'transient'
-    cache_directory: Path | None = field(default=None, compare=False, repr=False)
+    cache_directory: str | Path | None = field(default=None, compare=False, repr=False)
     content: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
@@ -155,7 +155,7 @@ _WIDEST = 3.0
 _CARRIED = ('rotor', 'speed_range_rpm')
 
 def load(
-    path: Path, overrides: Sequence[str] = (), *, cache_directory: Path | None = None,
+    path: Path, overrides: Sequence[str] = (), *, cache_directory: str | Path | None = None,
 ) -> Case:
     """
     Read and check a case file.
@@ -166,7 +166,7 @@ def load(
         The YAML file; `FILE#NAME` is one of its machines.
     overrides : sequence of str
         Settings `key.path=value` that replace or add to what the file says, in order.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         Where the tables of oil films lie; None is the usual one.
 
     Returns
@@ -188,7 +188,7 @@ def load(
 
 def case_of(
     path: Path, content: dict[str, Any], *, files: Mapping[str, str] | None = None,
-    cache_directory: Path | None = None,
+    cache_directory: str | Path | None = None,
 ) -> Case:
     """
     Return the machine of a document, as `load`.
@@ -201,7 +201,7 @@ def case_of(
         The document.
     files : mapping of str to str
         What such files say, where that came with the document.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         As `load`.
 
     """
@@ -242,7 +242,7 @@ class _Builder:
     faults: Faults
     content: Mapping[str, Any]
     files: dict[str, str]
-    cache_directory: Path | None
+    cache_directory: str | Path | None
     mended: frozenset[Place]
 
     def case(self) -> Case | None:

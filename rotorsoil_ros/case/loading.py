@@ -22,7 +22,7 @@ Tell = Callable[[str], object]
 
 
 def load_all(
-    files: Iterable[Path], *, cache_directory: Path | None, tell: Tell,
+    files: Iterable[Path], *, cache_directory: str | Path | None, tell: Tell,
 ) -> dict[Path, Machine]:
     """
     Load case files, each once, and compute what the cache does not hold.
@@ -45,7 +45,7 @@ def load_all(
 
 
 def cases_of(
-    files: Iterable[Path], *, cache_directory: Path | None,
+    files: Iterable[Path], *, cache_directory: str | Path | None,
 ) -> dict[Path, config.Case]:
     """Read case files, each once; raise InputError with all that is wrong with all of them."""
     cases, faults = dict[Path, config.Case](), []
@@ -82,7 +82,7 @@ def soil_keys(case: config.Case) -> list[str]:
     return keys
 
 
-def reload(file: Path, *, cache_directory: Path | None) -> Machine:
+def reload(file: Path, *, cache_directory: str | Path | None) -> Machine:
     """
     Load a case file again, computed by another process if need be.
 
@@ -98,7 +98,7 @@ def reload(file: Path, *, cache_directory: Path | None) -> Machine:
     return _complete(file, cache_directory)
 
 
-def _complete(file: Path, cache_directory: Path | None) -> Machine:
+def _complete(file: Path, cache_directory: str | Path | None) -> Machine:
     """Return a machine with its table: a callback must not have to wait for it."""
     machine = Machine.load(file, cache_directory=cache_directory)
     _ = machine.table, machine.oils

@@ -50,7 +50,7 @@ class Machine(ModalAnswers):
 
     @classmethod
     def load(
-        cls, case_file: Path, *, cache_directory: Path | None = None,
+        cls, case_file: Path, *, cache_directory: str | Path | None = None,
         overrides: Sequence[str] = (),
     ) -> 'Machine':
         """Read a case; settings `key.path=value` replace or add to what the file says."""
@@ -336,7 +336,9 @@ class Machine(ModalAnswers):
 
 
 
-def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: object) -> Machine:
+def load(
+    case: str | Path, *, cache_directory: str | Path | None = None, **overrides: object,
+) -> Machine:
     """
     Read the case file of a machine.
 
@@ -344,7 +346,7 @@ def load(case: str | Path, *, cache_directory: Path | None = None, **overrides: 
     ----------
     case : str or Path
         The YAML file; `FILE#NAME` is one of its machines.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         Where computed tables lie; None for $ROTORSOIL_CACHE, else the user's cache directory.
     **overrides
         Keys of the case to replace or to add: `soil={'shear_modulus': 30e6}`, or by their path,

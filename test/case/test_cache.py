@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rotorsoil_ros as rs
 from rotorsoil_ros.case import cache
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import load
@@ -183,3 +184,8 @@ def test_another_content_under_the_same_key_is_computed_again(tmp_path, caplog):
 def test_a_table_of_one_user_is_readable_to_the_service_of_another(tmp_path):
     Cache(tmp_path).store('kind', KEY, ARRAYS)
     assert Cache(tmp_path).path('kind', KEY).stat().st_mode & 0o777 == 0o644
+
+
+def test_a_directory_may_be_told_as_a_string(tmp_path):
+    rs.load(str(PAPER), cache_directory=str(tmp_path / 'there')).table  # noqa: B018
+    assert any((tmp_path / 'there').iterdir())

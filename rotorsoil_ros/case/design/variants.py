@@ -132,7 +132,7 @@ class Study:
 def study(
     case: Machine | Path | str, values: Mapping[str, Sequence[float] | FloatArray], *,
     rpm: Numbers, map: Mapper[Variant, Tried] = map,  # noqa: A002, as every executor calls it
-    cache_directory: Path | None = None,
+    cache_directory: str | Path | None = None,
 ) -> Study:
     """
     Solve a machine with all combinations of values of some keys of its case.
@@ -148,7 +148,7 @@ def study(
         Rotor speeds [rpm]: each is solved, no table is made.
     map : callable
         `map` itself, or that of an executor.
-    cache_directory : Path or None
+    cache_directory : str, Path or None
         Of tables; the user's by default.
 
     Returns

@@ -124,7 +124,7 @@ class Plant:
 
     @classmethod
     def load(
-        cls, case: str | Path, *, cache_directory: Path | None = None,
+        cls, case: str | Path, *, cache_directory: str | Path | None = None,
         overrides: Sequence[str] = (),
     ) -> 'Plant':
         """
@@ -134,7 +134,7 @@ class Plant:
         ----------
         case : str or Path
             The YAML file.
-        cache_directory : Path or None
+        cache_directory : str, Path or None
             Where computed tables lie; None for the usual place.
         overrides : sequence of str
             Settings `key.path=value` on top of it.
