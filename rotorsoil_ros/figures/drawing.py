@@ -1,5 +1,6 @@
 """The machine of a case, drawn to scale from the side and from its end."""
 
+from dataclasses import replace
 from itertools import pairwise
 import math
 from typing import Any
@@ -42,6 +43,11 @@ _GAP = 0.06
 
 def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
     """Draw shaft, discs, bearings, blocks and ground of a case, in a width in inches."""
+    beside = ''
+    if case.berth is not None:
+        beside = ', its neighbours left out' + (
+            ', blocks not turned' if case.berth.is_turned else '')
+        case = replace(case, foundations=case.berth.seen(case.foundations))
     left, right, reach, top = _extent(case)
     # Room for the labels of discs above, and of bearings to the right.
     depth = _drawn_depth(case, top)
@@ -67,7 +73,8 @@ def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
     given = all(block.height is not None for block in case.foundations)
     note = '' if given else ', heights of blocks after their centre of gravity'
     figure.suptitle(f'{case.name}: {_support(case)}\nto scale, discs as solid cylinders of their '
-                    f'mass and inertia{note};\nbearings and pedestals schematic', fontsize=9)
+                    f'mass and inertia{note}{beside};\nbearings and pedestals schematic',
+                    fontsize=9)
     return figure
 
 

@@ -105,7 +105,9 @@ class Scene:
         blocks = {foundation.name for foundation in case.foundations}
         self.blocks = [
             replace(_block(foundation, case, index), embedment=embedment.depth)
-            for foundation, embedment in zip(case.foundations, case.embedments, strict=True)]
+            for foundation, embedment in zip(
+                case.foundations if case.berth is None else case.berth.seen(case.foundations),
+                case.embedments, strict=True)]
         self.ground_seats = tuple(bearing.position for bearing in rotor.bearings
                                   if bearing.foundation not in blocks)
         self.y = np.linspace(0.0, self.length, SHAFT_POINTS)

@@ -19,6 +19,9 @@ from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.shaft import Probe
 from rotorsoil_ros.units import rad_s_to_rpm
 
+# A shaft whose heading is off by less is along the blocks [rad].
+_STRAIGHT = 1e-6
+
 _Station = TypeVar('_Station', Bearing, Disc, Probe)
 
 
@@ -67,6 +70,20 @@ class Berth:
         """Return the machine among its neighbours as one system of equations."""
         return SourceModel(rotor, foundations, soil_models, couples, points, self.place,
                            self.neighbours, self.index)
+
+    def seen(self, foundations: Sequence[Foundation]) -> tuple[Foundation, ...]:
+        """Return where blocks lie in the axes of the shaft, as pictures show them; not turned."""
+        cosine, sine = math.cos(self.place.heading), math.sin(self.place.heading)
+        ahead = [(block.centre_x - self.place.x, block.centre_y - self.place.y)
+                 for block in foundations]
+        return tuple(
+            replace(block, centre_x=cosine * x + sine * y, centre_y=cosine * y - sine * x)
+            for block, (x, y) in zip(foundations, ahead, strict=True))
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether its shaft lies along neither way of the y of the blocks."""
+        return abs(math.sin(self.place.heading)) > _STRAIGHT
 
     @property
     def running_beside(self) -> tuple[str, ...]:

@@ -272,6 +272,25 @@ def test_all_machines_are_told_what_is_wrong_with_them_at_once(tmp_path):
         'machines.1.unbalances.0.disc: must be one of coupling, wheel, got weel']
 
 
+def test_blocks_are_drawn_where_they_lie_from_the_shaft(house, tmp_path):
+    """Seen from the other end what was on the left is on the right, and what was ahead behind."""
+    first = house.machines['fan_1'].case
+    [block] = first.berth.seen(first.foundations)
+    assert (block.centre_x, block.centre_y) == pytest.approx((1.25, 0.2))
+
+    def turned(content):
+        content['machines'][1]['place'] = {'x': 1.25, 'y': 1.3, 'heading': '180 deg'}
+
+    second = load(written(tmp_path, turned), ['source=fan_2'])
+    [block] = second.berth.seen(second.foundations)
+    assert (block.centre_x, block.centre_y) == pytest.approx((1.25, 1.3))
+    assert not second.berth.is_turned
+    # A seat of the shaft is as far from the block in either picture of it.
+    seat = second.berth.place.point(0.25)
+    assert math.dist(seat, (0.0, 0.0)) == pytest.approx(
+        math.dist((0.0, 0.25), (block.centre_x, block.centre_y)))
+
+
 def test_heading_may_be_given_in_degrees_and_height_by_the_place_or_the_rotor(tmp_path):
     def turned(content):
         content['machines'][1]['place'] = {'x': 1.25, 'y': 1.3, 'heading': '180 deg'}
