@@ -22,14 +22,14 @@ PLACES = {
     'monitor': (1, 3, 'speed and vectors in, events out'),
     'wire': (0, 2.2, 'events to bytes of messages'),
     'bags': (0, 1.2, 'MCAP in and out'),
-    'feeds': (0, 0.2, 'control rooms, other halls'),
+    'feeds': (3, 1.2, 'control rooms, other halls'),
     'figures': (1, 1.2, 'pictures, pages on paper'),
     'screen': (2, 1.2, 'recording, live view'),
     'node': (1, 0.2, 'the ROS graph'),
     'cli': (1, -0.8, 'verbs: parse, call, print'),
     'testing': (2, -0.8, 'tests of those who talk to it'),
 }
-WIDTH, HEIGHT, BOX, TALL = 700, 640, 200, 44
+WIDTH, HEIGHT, BOX, TALL = 925, 640, 200, 44
 
 
 def taken_from() -> dict[str, set[str]]:
