@@ -8,8 +8,6 @@ import sys
 # Above them the ports of DDS reach those that the system hands out (DDSI-RTPS 2.3, 9.6.1.1).
 DOMAINS = 100
 
-_held: list[socket.socket] = []
-
 
 @cache
 def own_domain() -> int:
@@ -36,5 +34,5 @@ def _taken(domain: int) -> bool:
     except OSError:
         claim.close()
         return False
-    _held.append(claim)
+    claim.detach()  # held until the process ends
     return True
