@@ -144,22 +144,45 @@ class OnBodies:
         total[:, own:, own:] = -(self.omega**2 / unit)[:, None, None] * support.block_mass
         return total, unit
 
-    def _answer(self, loads: ComplexArray, ground: FloatArray) -> ComplexArray:
-        """Return what loads (p, k) and moving ground do to the points, and r, (n, p + c, k)."""
-        contacts, rows = self.support.contact_points, self.support.point_rows
+    def _on_one_contact_each(
+        self, elastic: ComplexArray, arriving: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """
+        Return r and a of bodies on one contact each, where R_c = 1: half as many unknowns.
+
+        (1 - w^2 (N + H_cc) M) a = (N + H_cc) R^T f - H_c f,  r = R^T f + w^2 M a.
+        """
+        contacts, mass = self.support.contact_points, self.support.block_mass
+        gives = self.support.ground(self.omega) + self._flexibility[:, contacts, contacts]
+        try:
+            moved = np.linalg.solve(carrying(gives, mass, self.omega), gives @ arriving - elastic)
+        except np.linalg.LinAlgError:
+            moved = np.full(elastic.shape, complex(np.nan, np.nan))
+        return arriving + self.omega[:, None, None] ** 2 * (mass @ moved), moved
+
+    def _on_patches(
+        self, elastic: ComplexArray, arriving: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return r and a of bodies on any contacts."""
         system, unit = self._system
-        elastic = self._flexibility @ loads
-        pushing = np.broadcast_to(rows.T @ loads, (len(unit), rows.shape[1], loads.shape[1]))
-        follows = self.support.follow_rows @ ground
-        right = np.concatenate([elastic[:, contacts] - follows, pushing / unit[:, None, None]],
-                               axis=1)
+        own = elastic.shape[1]
+        pushing = np.broadcast_to(arriving, (len(unit), *arriving.shape[-2:]))
+        right = np.concatenate([elastic, pushing / unit[:, None, None]], axis=1)
         try:
             found = np.linalg.solve(system, right)
         except np.linalg.LinAlgError:
             found = np.full(right.shape, complex(np.nan, np.nan))
-        own = right.shape[1] - rows.shape[1]
-        force = unit[:, None, None] * found[:, :own]
-        moved = elastic - self._flexibility[:, :, contacts] @ force + rows @ found[:, own:]
+        return unit[:, None, None] * found[:, :own], found[:, own:]
+
+    def _answer(self, loads: ComplexArray, ground: FloatArray) -> ComplexArray:
+        """Return what loads (p, k) and moving ground do to the points, and r, (n, p + c, k)."""
+        contacts, rows = self.support.contact_points, self.support.point_rows
+        elastic = self._flexibility @ loads
+        solve = (self._on_patches if any(part.is_patched for part in self.support.members)
+                 else self._on_one_contact_each)
+        force, rigid = solve(elastic[:, contacts] - self.support.follow_rows @ ground,
+                             rows.T @ loads)
+        moved = elastic - self._flexibility[:, :, contacts] @ force + rows @ rigid
         return np.concatenate([moved, force], axis=1)
 
     @cached_property

@@ -159,8 +159,11 @@ class FlexibleBody:
 
     @cached_property
     def contacts(self) -> IntArray:
-        """Motions that the ground resists, those of one place together."""
-        return np.array(self.of_kind(CONTACT), dtype=int)
+        """Motions that the ground resists, those of one place together, x before rz."""
+        rows = self.of_kind(CONTACT)
+        places = list(dict.fromkeys(self.dofs[row].station for row in rows))
+        return np.array(sorted(rows, key=lambda row: (
+            places.index(self.dofs[row].station), DOFS.index(self.dofs[row].axis))), dtype=int)
 
     @cached_property
     def patches(self) -> tuple[Dof, ...]:

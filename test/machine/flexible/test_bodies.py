@@ -292,3 +292,15 @@ def test_modes_are_those_of_all_motions_together():
 
     found = np.abs(SpectrumSolver.lowest(model, np.array([1e-3]), 10).frequency[0])
     np.testing.assert_allclose(found, exact, rtol=1e-5)
+
+
+def test_motions_of_a_contact_may_come_in_any_order():
+    body, block = on_one_contact()
+    order = np.array([9, 4, 0, 7, 1, 5, 2, 8, 3, 6])
+    mixed = replace(
+        body, dofs=tuple(body.dofs[row] for row in order), rows=body.rows[order],
+        shapes=body.shapes[order], residual=body.residual[np.ix_(order, order)])
+    omega = np.array([100.0, 500.0])
+    found, exact = (paper_on(one, block).support.standing(omega).receptance
+                    for one in (mixed, body))
+    np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-20)
