@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 import numpy as np
 
-from rotorsoil_ros.arrays import BoolArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.figures.response import COLOURS, legend_below
 from rotorsoil_ros.machine.peaks import resolved_speeds
@@ -94,21 +94,37 @@ def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
 def _draw_prediction(
     amplitude: Axes, phase: Axes, comparison: Comparison, points: ChannelPoints,
 ) -> None:
-    """Draw the prediction that the points were held against, from the slowest to the fastest."""
+    """Draw the prediction that points were held against, and the steady one at all speeds."""
     expectation = comparison.expectation
+    follows = len(expectation.table.poles) > 0
     given = np.isfinite(points.predicted)
-    order = np.argsort(points.speed[given], kind='stable')
-    speed, vector = points.speed[given][order], points.predicted[given][order]
+    # What follows the changes of the speed comes in the order of time.
+    order = np.flatnonzero(given) if follows else (
+        np.flatnonzero(given)[np.argsort(points.speed[given], kind='stable')])
+    speed, vector = points.speed[order], points.predicted[order]
     unbalances = comparison.run.unbalances
     if points.channel in expectation.table.channels and len(unbalances) == 1 and len(speed):
         predictor = expectation.table.predictor(unbalances[0][1])
         dense = resolved_speeds(predictor)
-        dense = dense[(dense >= speed[0]) & (dense <= speed[-1])]
+        dense = dense[(dense >= speed.min()) & (dense <= speed.max())]
         if len(dense):
             column = expectation.table.channels.index(points.channel)
-            speed, vector = dense, answer(predictor, dense)[:, column]
-    style: dict[str, Any] = {'color': PREDICTED, 'linewidth': 1.2}
-    amplitude.plot(rad_s_to_rpm(speed), _MICRO * np.abs(vector), label='predicted', **style)
+            steady = answer(predictor, dense)[:, column]
+            if not follows:
+                speed, vector = dense, steady
+            else:
+                _draw_vectors(amplitude, phase, dense, steady, color=PREDICTED, linewidth=0.8,
+                              linestyle='--', label='predicted at constant speed')
+    _draw_vectors(amplitude, phase, speed, vector, color=PREDICTED, linewidth=1.2,
+                  label='predicted')
+
+
+def _draw_vectors(
+    amplitude: Axes, phase: Axes, speed: FloatArray, vector: ComplexArray, *, label: str,
+    **style: Any,
+) -> None:
+    """Draw vectors over speed [rad/s]: the phase is not drawn across a whole turn."""
+    amplitude.plot(rad_s_to_rpm(speed), _MICRO * np.abs(vector), label=label, **style)
     degrees = np.rad2deg(np.angle(vector))
     jump = np.abs(np.diff(degrees, prepend=degrees[:1])) > 300.0
     phase.plot(rad_s_to_rpm(speed), np.where(jump, np.nan, degrees), **style)
