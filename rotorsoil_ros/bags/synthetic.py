@@ -9,6 +9,8 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import NANOSECONDS
+from rotorsoil_ros.ground.bed import below_patches
+from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.band import on_soils
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.time_domain import shake, Shaking
@@ -116,11 +118,13 @@ def profile(truth: Truth) -> tuple[FloatArray, FloatArray]:
 
 def on_ground(model: CoupledModel, factor: float) -> CoupledModel:
     """Return a machine on ground whose shear modulus is multiplied by a factor."""
-    soils = [soil.soil for soil in model.soil_models if hasattr(soil, 'soil')]
-    if not soils:
+    soils: list[Soil | None] = [getattr(one, 'soil', getattr(one, 'material', None))
+                                for own in model.soil_models for one in below_patches(own)]
+    given = next(filter(None, soils), None)
+    if given is None:
         return model
     return on_soils(model, [replace(
-        soils[0], shear_modulus=factor * soils[0].shear_modulus)])[0]
+        given, shear_modulus=factor * given.shear_modulus)], of=given)[0]
 
 
 def _speeds(machine: str, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> Records:

@@ -268,7 +268,7 @@ class _Builder:
         journals = (None if rotor is None or speed_range is None
                     else self._journals().journals(rotor, speed_range))
         oils = faults.attempt(self._journals().oil_temperatures)
-        uncertainty = faults.attempt(self._uncertainty)
+        uncertainty = faults.attempt(lambda: on.uncertainty(ground))
         zones = faults.attempt(lambda: zones_of(faults))
         model, sensors = None, None
         if names_differ and rotor is not None and foundations is not None:
@@ -384,12 +384,6 @@ class _Builder:
         self.faults.attempt(kind)
         self.faults.attempt_each(reach, case.foundations)
         self.faults.attempt(lambda: SiteEntries(self.faults).refuse_unreachable(case))
-
-    def _uncertainty(self) -> SoilSpread:
-        entry = self.faults.entries.uncertainty
-        given = {} if entry is None else entry.model_dump(exclude_none=True)
-        with self.faults.at('uncertainty', entry=entry):
-            return SoilSpread(**given)
 
     def _speed_range(self) -> tuple[float, float]:
         low, high = self.faults.entries.speed_range_rpm

@@ -176,7 +176,8 @@ def response_band(
     others = []
     for place, on_solved, on_stiffer in islice(forms, spread.samples - 1):
         machine = machine_at(case, model, spread, place, Cache(directory))
-        solved_on = [on_soil(one, _soil_at(case.soil, model, spread, place), block.contact)
+        solved_on = [on_soil(one, _soil_at(case.soil, model, spread, place), block.contact,
+                              of=case.soil)
                      for one, block in zip(elements, model.foundations, strict=False)
                      if case.soil is not None]
         others.append(of_other_form(machine, solved=solved_on, stiffer=stiffer,
@@ -202,7 +203,7 @@ def machine_at(
     layered = case.ground is not None
     if spread.changes_ground(place, layered=layered) and case.support.geometry == 'disc':
         machine = replace(machine, soil_models=_other_grounds(case, spread, place, cache))
-    return on_soils(machine, [_soil_at(case.soil, model, spread, place)])[0]
+    return on_soils(machine, [_soil_at(case.soil, model, spread, place)], of=case.soil)[0]
 
 
 def _other_grounds(

@@ -233,6 +233,7 @@ class Uncertainty(Entry):
     shaft_height_factor: Ratio | None = None
     foundation_stiffness_factor: Ratio | None = None
     unbalance_factor: Ratio | None = None
+    layer_stiffness_factor: Ratio | None = None
     model_form: StrictBool | None = None
     rock_depth: tuple[Metre, MetreOrEndless] | None = None
     side_contact: tuple[Ratio, Ratio] | None = None

@@ -53,12 +53,26 @@ class NeighbourSoil:
         return np.asarray(self.solved.compliance(omega) * np.outer(scale, scale))
 
 
-def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
+def on_soil(
+    model: SoilModel, soil: Soil, contact: Contact, *, of: Soil | None = None,
+) -> SoilModel:
     """
     Return a model of the same kind as a given one, below the same contacts, on another soil.
 
-    Layers are all stiffened and made heavier in the ratio in which the one below the base is,
-    which is exact; their other figures stay.
+    Layers are all stiffened and made heavier in one ratio, which is exact; their other figures
+    stay.
+
+    Parameters
+    ----------
+    model : SoilModel
+        The given one.
+    soil : Soil
+        The other soil.
+    contact : Contact
+        Where there is one of its own.
+    of : Soil or None
+        What the other soil stands in the place of; None is what is below this base. Where bases
+        are in different layers it is that of one of them, the same for all.
 
     Raises
     ------
@@ -68,7 +82,8 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
     """
     match model:
         case PatchedGround():
-            found = model.mapped(lambda one: on_soil(one, soil, getattr(one, 'contact', contact)))
+            found = model.mapped(lambda one: on_soil(
+                one, soil, getattr(one, 'contact', contact), of=of))
             assert found is not None
             return found
         case BoundaryElementModel() | GreenModel():
@@ -80,12 +95,8 @@ def on_soil(model: SoilModel, soil: Soil, contact: Contact) -> SoilModel:
             table = replace(table, loss_factor=soil.loss_factor)
             return NeighbourSoil(InfiniteElementModel(as_solved, contact, table),
                                  soil.poisson_ratio)
-        case LayeredSiteModel():
-            own = model.material
-            return model.scaled(modulus=soil.shear_modulus / own.shear_modulus,
-                                density=soil.density / own.density)
-        case ThinLayerModel():
-            own = model.ground.at(model.embedment.depth)
+        case LayeredSiteModel() | ThinLayerModel():
+            own = of or model.material
             return model.scaled(modulus=soil.shear_modulus / own.shear_modulus,
                                 density=soil.density / own.density)
     raise RotorSoilError(f'a support of type {type(model).__name__} does not depend on the soil')

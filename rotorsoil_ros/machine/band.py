@@ -273,13 +273,35 @@ def depends_on_soil(model: CoupledModel) -> bool:
                for own in model.soil_models for soil in below_patches(own))
 
 
-def on_soils(model: CoupledModel, soils: Sequence[Soil]) -> list[CoupledModel]:
-    """Return a machine on each of several soils, the same below all of its blocks."""
+def on_soils(
+    model: CoupledModel, soils: Sequence[Soil], *, of: Soil | None = None,
+) -> list[CoupledModel]:
+    """
+    Return a machine on each of several soils, the same below all of its blocks.
+
+    Parameters
+    ----------
+    model : CoupledModel
+        The machine.
+    soils : sequence of Soil
+        What may be below its blocks.
+    of : Soil or None
+        What that stands in the place of; None is what is below the deepest base. Layers are
+        stiffened and made heavier in the ratio of the two.
+
+    """
+    of = of or _below_deepest(model)
     return [replace(model, soil_models=tuple(
-        on_soil(own, soil, block.contact)
+        on_soil(own, soil, block.contact, of=of)
         # One ground below all blocks needs none of their contacts.
         for own, block in zip(model.soil_models, model.foundations, strict=False)))
         for soil in soils]
+
+
+def _below_deepest(model: CoupledModel) -> Soil | None:
+    below = [one for own in model.soil_models for one in below_patches(own)
+             if isinstance(one, ThinLayerModel)]
+    return max(below, key=lambda one: one.embedment.depth).material if below else None
 
 
 def of_other_form(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 import math
+import re
 from typing import TypeAlias
 
 from rotorsoil_ros.errors import require
@@ -19,7 +20,7 @@ _MOST_SAMPLES = 4096
 # Half-widths, and what is no input; everything else is a factor.
 _HALF_WIDTHS = ('poisson_ratio', 'loss_factor')
 _GROUND = ('rock_depth', 'side_contact', 'ground_water')
-_NO_FACTORS = (*_HALF_WIDTHS, *_GROUND, 'samples', 'model_form')
+_NO_FACTORS = (*_HALF_WIDTHS, *_GROUND, 'samples', 'model_form', 'layers')
 
 # Of the soil: what only a support that knows of one depends on.
 SOIL_INPUTS = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor', 'soil_density_factor')
@@ -28,6 +29,10 @@ UNBALANCE = 'unbalance_factor'
 
 # Steps along the range of what changes the ground, where the answer is far from even in between.
 _STEPS = {'rock_depth': 4, 'side_contact': 2, 'ground_water': 1}
+
+# Stiffness of one layer by itself, the uppermost 1; the half-space below them is the last.
+OF_LAYER = 'layer_stiffness_factor'
+_LAYER = re.compile(rf'{OF_LAYER}_(\d+)')
 
 # Poisson's ratio of soil full of water.
 _SATURATED = 0.49
@@ -71,6 +76,10 @@ class SoilSpread:
         Of the modulus of foundations that bend.
     unbalance_factor : float
         Of the unbalance, all planes alike.
+    layer_stiffness_factor : float
+        Of the G of each of the layers by itself, beside what is said of all of them.
+    layers : int
+        How many soils the ground is made of, what is below the layers among them.
     rock_depth : tuple of two floats or None
         Between which depths below the surface rigid rock may lie [m]; infinite where there may be
         none, evenly in the inverse of the depth. None where the case says all that is known.
@@ -100,6 +109,8 @@ class SoilSpread:
     shaft_height_factor: float = 1.0
     foundation_stiffness_factor: float = 1.0
     unbalance_factor: float = 1.0
+    layer_stiffness_factor: float = 1.0
+    layers: int = 0
     rock_depth: tuple[float, float] | None = None
     side_contact: tuple[float, float] | None = None
     ground_water: bool = False
@@ -125,12 +136,18 @@ class SoilSpread:
     def inputs(self, *, with_soil: bool) -> tuple[str, ...]:
         """Return the names of what is not known exactly, those of the soil first."""
         others = (own.name for own in fields(self)
-                  if own.name not in (*SOIL_INPUTS, *_GROUND, 'samples', 'model_form'))
+                  if own.name not in (*SOIL_INPUTS, *_GROUND, 'samples', 'model_form', 'layers',
+                                      OF_LAYER))
         known = tuple(name for name in (*(SOIL_INPUTS if with_soil else ()), *others)
                       if getattr(self, name) > (0.0 if name in _HALF_WIDTHS else 1.0))
-        ground = tuple(name for name in _GROUND if with_soil and getattr(self, name))
+        ground = (*self._of_layers, *(name for name in _GROUND if getattr(self, name)))
         # Behind the stiffness of the soil, which comes before all others.
         return (*known[:1], *ground, *known[1:]) if with_soil else known
+
+    @property
+    def _of_layers(self) -> tuple[str, ...]:
+        uncertain = self.layer_stiffness_factor > 1.0
+        return tuple(f'{OF_LAYER}_{number + 1}' for number in range(self.layers * uncertain))
 
     def places(self, *, with_soil: bool) -> list[dict[str, float]]:
         """
@@ -179,7 +196,8 @@ class SoilSpread:
     def changes_ground(self, place: Place, *, layered: bool) -> bool:
         """Return whether the ground at a place has to be solved anew, as layers have for nu."""
         return any(name in place and getattr(self, name)
-                   for name in (*_GROUND, *(_HALF_WIDTHS if layered else ())))
+                   for name in (*_GROUND, *(_HALF_WIDTHS if layered else ()))) or any(
+                       name in place for name in self._of_layers)
 
     def ground(
         self, ground: LayeredSoil, embedment: Embedment, place: Place,
@@ -202,6 +220,10 @@ class SoilSpread:
                 soil, loss_factor=max(soil.loss_factor + loss, LEAST_LOSS_FACTOR),
                 poisson_ratio=min(max(soil.poisson_ratio + ratio, 0.0),
                                   max(soil.poisson_ratio, _SATURATED))))
+        if self._of_layers:
+            ground = ground.stiffened([
+                self.layer_stiffness_factor ** round(place.get(name, 0.0))
+                for name in self._of_layers])
         if self.ground_water and 'ground_water' in place:
             water = share('ground_water')
             ground = ground.changed(lambda soil: replace(soil, poisson_ratio=(
@@ -214,6 +236,12 @@ class SoilSpread:
             elif ground.below is None:
                 ground = LayeredSoil(ground.layers[:-1], ground.layers[-1].soil)
         return ground, embedment
+
+    @staticmethod
+    def layer_of(name: str) -> int | None:
+        """Return which layer an input is of, the uppermost 1; None of any other input."""
+        found = _LAYER.fullmatch(name)
+        return int(found[1]) if found else None
 
     def machine(self, model: CoupledModel, place: Place) -> CoupledModel:
         """Return a machine with rotor, bearings and blocks as they are at a place."""

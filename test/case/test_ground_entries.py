@@ -8,10 +8,12 @@ import pytest
 import yaml
 
 import rotorsoil_ros as rs
+from rotorsoil_ros.bags.synthetic import on_ground
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.design.depth import depth_remarks
-from rotorsoil_ros.case.design.ground import model_error
+from rotorsoil_ros.case.design.ground import band_contents, model_error
 from rotorsoil_ros.case.design.influence import influences, velocity
+from rotorsoil_ros.case.design.inputs import input_of
 from rotorsoil_ros.case.design.shapes import shape_errors
 from rotorsoil_ros.case.models import machine_at
 from rotorsoil_ros.case.summary import derived_quantities, warnings
@@ -20,6 +22,7 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Soil
+from rotorsoil_ros.machine.band import on_soils
 from rotorsoil_ros.machine.spread import SoilSpread
 
 FAN = 'rotorsoil_ros/config/plant_fan.yaml'
@@ -244,6 +247,45 @@ def test_damping_of_layers_is_an_input_of_its_own(fan):
     assert least > 2.0 * most
 
 
+def test_each_layer_may_be_softer_by_itself_and_is_told_by_its_number(fan):
+    """Against the case that says so, G of both scaled too; nothing else is another one."""
+    omega = np.array([60.0, 150.0])
+
+    def layers(first, second):
+        return {'layers': [{**LAYER, 'shear_modulus': first}], 'below': {
+            **SAND, 'shear_modulus': second}}
+
+    machine = fan(soil=layers(100e6, 400e6), support=THIN, uncertainty={
+        'layer_stiffness_factor': 2.0, 'shear_modulus_factor': 1.5})
+    spread = machine.case.uncertainty
+    assert spread.inputs(with_soil=True)[:3] == (
+        'shear_modulus_factor', 'layer_stiffness_factor_1', 'layer_stiffness_factor_2')
+    place = {'shear_modulus_factor': 1.0, 'layer_stiffness_factor_1': -1.0}
+    moved = machine_at(machine.case, machine.model, spread, place).soil_models[0]
+    meant = fan(soil=layers(75e6, 600e6), support=THIN).model.soil_models[0]
+    np.testing.assert_allclose(moved.compliance(omega), meant.compliance(omega), rtol=2e-4,
+                               atol=1e-15)
+    assert input_of('layer_stiffness_factor_2').low == 'softest layer 2'
+    assert 'stiffness of layer 2 (within a factor 2)' in band_contents(machine.case)
+
+
+def test_blocks_in_two_layers_stay_as_they_are_where_nothing_is_off(fan):
+    machine = fan(soil={'layers': [LAYER], 'below': {**SAND, 'shear_modulus': 400e6}},
+                  support=THIN, block={'embedment': 0.0})
+    one = machine.model.soil_models[0]
+    deep = replace(one, embedment=Embedment(2.0))
+    pair = replace(machine.model, soil_models=(one, deep), foundations=(
+        *machine.model.foundations, replace(machine.model.foundations[0], name='deep')))
+    [same] = on_soils(pair, [deep.material])
+    assert [each.ground for each in same.soil_models] == [one.ground, deep.ground]
+
+
+def test_softer_ground_is_softer_in_every_layer(fan):
+    machine = fan(soil=ROCK, support=THIN)
+    [ground] = on_ground(machine.model, 0.5).soil_models
+    assert ground.material.shear_modulus == pytest.approx(50e6)
+
+
 def test_silence_about_rock_is_told_with_its_cost(fan, cache):
     machine = fan()
     [told] = depth_remarks(machine.case, machine.model, cache)
@@ -258,7 +300,9 @@ def test_silence_about_rock_is_told_with_its_cost(fan, cache):
     ({'rock_depth': [3.0, 1.5]}, 'uncertainty.rock_depth: must be two rising depths > 0 m'),
     ({'rock_depth': [0.0, 1.5]}, 'uncertainty.rock_depth: must be two rising depths > 0 m'),
     ({'rock_depth': [math.inf, 1.5]}, 'uncertainty.rock_depth.0: must be a finite number in m'),
-    ({'side_contact': [0.5, 1.5]}, 'uncertainty.side_contact: must be two rising shares')])
+    ({'side_contact': [0.5, 1.5]}, 'uncertainty.side_contact: must be two rising shares'),
+    ({'layer_stiffness_factor': 2.0}, 'uncertainty.layer_stiffness_factor: belongs to soil.layers;'
+                                      ' of one soil it is shear_modulus_factor, got 2')])
 def test_impossible_spread_is_one_line(fan, keys, fault):
     with pytest.raises(InputError) as caught:
         fan(uncertainty=keys)

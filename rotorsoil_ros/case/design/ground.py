@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.design.inputs import INPUTS
+from rotorsoil_ros.case.design.inputs import input_of, key_of
 from rotorsoil_ros.case.entries.ground import THIN_LAYERS
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
 from rotorsoil_ros.case.flexible.words import bed_error
@@ -178,7 +178,7 @@ def band_contents(case: Case) -> str:
     """Return what the edges of the band of a case hold; empty if it has none."""
     spread, knows_soil = case.uncertainty, (
         case.soil is not None and case.support.model in (*_BY_DISCS, BOUNDARY_ELEMENTS))
-    parts = [f'{INPUTS[name].words} ({_extent(getattr(spread, name))})'
+    parts = [f'{input_of(name).words} ({_extent(getattr(spread, key_of(name)))})'
              for name in spread.inputs(with_soil=knows_soil) if name not in _SOIL]
     if case.berth is not None and any(case.berth.fastest):
         parts.append('neighbours that stand or run their fastest')

@@ -11,7 +11,7 @@ import numpy as np
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.design.inputs import INPUTS, UncertainInput
+from rotorsoil_ros.case.design.inputs import input_of, UncertainInput
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.accuracy import gap
 from rotorsoil_ros.ground.plan import Part, Plan
@@ -49,7 +49,7 @@ class Influence:
     @property
     def input(self) -> UncertainInput:
         """What the input is, in words."""
-        return INPUTS[self.key]
+        return input_of(self.key)
 
     @property
     def ends(self) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from rotorsoil_ros.machine.spread import OF_LAYER, SoilSpread
+
 
 @dataclass(frozen=True, slots=True)
 class UncertainInput:
@@ -75,3 +77,19 @@ INPUTS = {
         'unbalance', 'least unbalance', 'most unbalance',
         'agree a balance grade with the maker, and balance the rotor in place'),
 }
+
+
+def key_of(name: str) -> str:
+    """Return the key of `uncertainty` that an input of a spread belongs to."""
+    return OF_LAYER if SoilSpread.layer_of(name) else name
+
+
+def input_of(name: str) -> UncertainInput:
+    """Return what an input of a spread is, that of a layer too."""
+    layer = SoilSpread.layer_of(name)
+    if layer is None:
+        return INPUTS[name]
+    return UncertainInput(
+        f'stiffness of layer {layer}', f'softest layer {layer}', f'stiffest layer {layer}',
+        'measure the velocity of shear waves down a bore hole (down-hole, cross-hole or seismic '
+        'cone)')

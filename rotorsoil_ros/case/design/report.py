@@ -13,6 +13,7 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.authoring.comments import Guess
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.influence import Influence
+from rotorsoil_ros.case.design.inputs import key_of
 from rotorsoil_ros.case.design.margins import NearModes, SeparationMargin
 from rotorsoil_ros.case.zone_limits import SupportClass, Zone, zone
 from rotorsoil_ros.channel import Channel
@@ -187,7 +188,7 @@ def _mode(one: SeparationMargin) -> Mapping[str, Any]:
 def _influence(one: Influence) -> Mapping[str, Any]:
     [largest] = _numbers(1e3 * np.array([one.largest]))
     return {
-        'input': one.input.words, 'key': f'uncertainty.{one.key}',
+        'input': one.input.words, 'key': f'uncertainty.{key_of(one.key)}',
         'velocity_mm_s_rms': _numbers(1e3 * one.ends), 'largest_mm_s_rms': largest,
         'swing': one.swing if math.isfinite(one.swing) else None, 'advice': one.input.advice,
     }

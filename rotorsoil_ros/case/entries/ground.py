@@ -21,6 +21,7 @@ from rotorsoil_ros.ground.layers.profile import (
     SURFACE,
 )
 from rotorsoil_ros.ground.soil import Contact, Soil
+from rotorsoil_ros.machine.spread import OF_LAYER, SoilSpread
 
 # The support that knows layers and walls in the ground.
 THIN_LAYERS = 'thin_layers'
@@ -186,10 +187,25 @@ class GroundEntries:
                     f'must be disc below what bends (foundations.{index}), got '
                     f'{entries.support.geometry}'))
 
+    def uncertainty(self, ground: Soil | LayeredSoil | None) -> SoilSpread:
+        """Return how far the machine may be from what the file says."""
+        entry = self.faults.entries.uncertainty
+        given = {} if entry is None else entry.model_dump(exclude_none=True)
+        layers = len(ground.soils) if isinstance(ground, LayeredSoil) else 0
+        with self.faults.at('uncertainty', entry=entry):
+            return SoilSpread(**given, layers=layers)
+
     def refuse_unfit_spread(self) -> None:
-        """Raise an InputError where a block would stand in the rock that may be there."""
+        """Raise an InputError where there is no such ground as that which may be there."""
         entries = self.faults.entries
-        if entries.uncertainty is None or entries.uncertainty.rock_depth is None:
+        if entries.uncertainty is None:
+            return
+        if (entries.uncertainty.layer_stiffness_factor is not None
+                and not isinstance(entries.soil, schema.LayersEntry)):
+            raise self.faults.error('uncertainty', OF_LAYER, problem=(
+                'belongs to soil.layers; of one soil it is shear_modulus_factor, got '
+                f'{entries.uncertainty.layer_stiffness_factor:g}'))
+        if entries.uncertainty.rock_depth is None:
             return
         if entries.support.geometry != 'disc':
             raise self.faults.error('uncertainty', 'rock_depth', problem=(

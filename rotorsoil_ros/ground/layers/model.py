@@ -144,9 +144,14 @@ class ThinLayerModel:
         return cls(ground, contact, scaled.table(), embedment)
 
     @property
+    def material(self) -> Soil:
+        """What is below the base."""
+        return self.ground.at(self.embedment.depth)
+
+    @property
     def _unit(self) -> tuple[float, float, float]:
         """Shear modulus [Pa], length [m] and frequency [rad/s] in which the table counts."""
-        soil = self.ground.at(self.embedment.depth)
+        soil = self.material
         length = float(equivalent_radii(self.contact)[0])
         return soil.shear_modulus, length, soil.shear_wave_speed / length
 

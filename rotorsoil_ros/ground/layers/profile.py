@@ -1,6 +1,6 @@
 """Which layers the ground has from the surface down, and how deep a block stands in it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -88,6 +88,12 @@ class LayeredSoil:
         return LayeredSoil(
             tuple(replace(layer, soil=change(layer.soil)) for layer in self.layers),
             None if self.below is None else change(self.below))
+
+    def stiffened(self, factors: Sequence[float]) -> 'LayeredSoil':
+        """Return the same layers, the modulus of each of `soils` times a factor of its own."""
+        factor = iter(factors)
+        return self.changed(lambda soil: replace(
+            soil, shear_modulus=next(factor) * soil.shear_modulus))
 
     def on_rock(self, depth: float) -> 'LayeredSoil':
         """

@@ -10,8 +10,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, NotSolvedError
-from rotorsoil_ros.ground.neighbours import on_soil
-from rotorsoil_ros.machine.band import depends_on_soil
+from rotorsoil_ros.machine.band import depends_on_soil, on_soils
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.identification import slips
@@ -265,11 +264,10 @@ class _Responding:
 
 def _rebuilt(case: Case, nominal: CoupledModel) -> CoupledModel:
     """Return the model of a changed case, on the tables of the nominal one."""
-    soils = nominal.soil_models
-    if case.soil is not None and depends_on_soil(nominal):
-        soils = tuple(on_soil(own, case.soil, block.contact)
-                      for own, block in zip(soils, case.foundations, strict=False))
-    return replace(nominal, rotor=case.rotor, foundations=case.foundations, soil_models=soils)
+    model = replace(nominal, rotor=case.rotor, foundations=case.foundations)
+    if case.soil is None or not depends_on_soil(nominal):
+        return model
+    return on_soils(model, [case.soil])[0]
 
 
 def _refuse_blind(problem: Problem, logs: FloatArray, columns: Sequence[str]) -> None:
