@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from itertools import count
 import math
 import re
 from typing import TypeAlias
@@ -154,7 +155,8 @@ class SoilSpread:
         Return where the machines of a band lie, the same in every process.
 
         The given machine comes first, then both ends of each input alone, that of the soil's G
-        before all others; what is left of the samples varies everything together.
+        before all others; what is left of the samples varies everything together, of what needs
+        the ground to be solved anew one layer at a time, or all that is no layer.
         """
         from scipy.stats import qmc  # takes a quarter of a second to import
 
@@ -166,7 +168,16 @@ class SoilSpread:
         alone = alone[:max(2, self.samples // 2)]
         rest = self.samples - 1 - len(alone)
         cube = 2.0 * qmc.LatinHypercube(len(names), seed=0).random(max(rest, 0)) - 1.0
-        return [{}, *alone, *(dict(zip(names, row, strict=True)) for row in cube.tolist())]
+        together = (dict(zip(names, row, strict=True)) for row in cube.tolist())
+        return [{}, *alone, *map(self._on_few_grounds, together, count())]
+
+    def _on_few_grounds(self, place: dict[str, float], number: int) -> dict[str, float]:
+        """Return a place that keeps one layer, in turns, or all that changes ground but layers."""
+        if not (layers := self._of_layers):
+            return place
+        kept = (*layers, None)[number % (len(layers) + 1)]
+        dropped = set(layers) if kept is None else {*layers, *_GROUND, *_HALF_WIDTHS} - {kept}
+        return {name: value for name, value in place.items() if name not in dropped}
 
     def scale(self, name: str, place: Place) -> float:
         """Return by what the value of an input is multiplied at a place."""

@@ -19,7 +19,7 @@ from rotorsoil_ros.case.models import machine_at
 from rotorsoil_ros.case.summary import derived_quantities, warnings
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
+from rotorsoil_ros.ground.layers.profile import Embedment, Layer, LayeredSoil
 from rotorsoil_ros.ground.neighbours import on_soil
 from rotorsoil_ros.ground.soil import Soil
 from rotorsoil_ros.machine.band import on_soils
@@ -267,6 +267,17 @@ def test_each_layer_may_be_softer_by_itself_and_is_told_by_its_number(fan):
                                atol=1e-15)
     assert input_of('layer_stiffness_factor_2').low == 'softest layer 2'
     assert 'stiffness of layer 2 (within a factor 2)' in band_contents(machine.case)
+
+
+def test_layers_of_a_band_need_few_grounds():
+    """Three layers alone, and what changes the ground but them: no product of both."""
+    spread = SoilSpread(layer_stiffness_factor=2.0, layers=3, samples=256)
+    soil = Soil(**SAND)
+    ground = LayeredSoil((Layer(1.0, soil), Layer(2.0, soil)), soil)
+    places = spread.places(with_soil=True)
+    assert len({spread.ground(ground, Embedment(), place)[0] for place in places}) == 9 + 2 * 3
+    assert all(any(f'layer_stiffness_factor_{number}' in place for place in places[8:])
+               for number in (1, 2, 3))
 
 
 def test_blocks_in_two_layers_stay_as_they_are_where_nothing_is_off(fan):

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.authoring import library
 from rotorsoil_ros.case.authoring.library import BearingKind, MachineKind, PedestalKind, SoilClass
 from rotorsoil_ros.case.authoring.questions import Answers
+from rotorsoil_ros.case.entries.shaft import MaterialEntry, Section
 from rotorsoil_ros.ground.soil import Soil
 
 PAGE = Path(__file__).parents[2] / 'docs' / 'library.md'
@@ -90,10 +90,10 @@ def test_every_entry_can_be_answered(key, shelf):
 
 
 def test_every_material_of_the_schema_is_in_the_library():
-    words = schema.MaterialEntry.model_fields
+    words = MaterialEntry.model_fields
     for name in library.names('materials'):
         assert set(library.entries('materials')[name]) == set(words)
-        schema.Section(length=1.0, outer_diameter=0.1, elements=1, material=name)
+        Section(length=1.0, outer_diameter=0.1, elements=1, material=name)
 
 
 def rows():

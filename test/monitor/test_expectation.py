@@ -9,12 +9,8 @@ import pytest
 
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.config import load
-from rotorsoil_ros.case.models import (
-    coupled_model,
-    infinite_element_model,
-    response_band,
-    response_table,
-)
+from rotorsoil_ros.case.design.tables import infinite_element_model
+from rotorsoil_ros.case.models import coupled_model, response_band, response_table
 from rotorsoil_ros.ground.elements import tabulate as elements_tabulate
 from rotorsoil_ros.machine.spread import SoilSpread
 from rotorsoil_ros.monitor.criteria import answer, Expectation
