@@ -123,8 +123,13 @@ class Watch:
         return self._machine.table.channels == self._shown_channels
 
     def _sinks(self) -> list[Sink]:
-        encoder = Encoder(self.name, self._machine.table.channels, self._topics)
-        outlets = [self._send, self._log.write] if self._log.is_written else [self._send]
+        is_written = self._log.is_written
+        steady = [publisher for name, publisher in zip(
+            OWN_TOPICS, self._own_publishers, strict=True) if name.startswith('steady/')]
+        encoder = Encoder(
+            self.name, self._machine.table.channels, self._topics, wants_steady=lambda: (
+                is_written or any(publisher.get_subscription_count() for publisher in steady)))
+        outlets = [self._send, self._log.write] if is_written else [self._send]
         sinks: list[Sink] = [Messenger(encoder, outlets), self._tell, *self._others]
         return [*sinks, self._log.show] if self._is_shown and self._log.is_shown else sinks
 

@@ -173,11 +173,16 @@ class Encoder:
         What is predicted of it.
     topics : Topics
         Where.
+    wants_steady : callable
+        Whether anybody hears what a machine does at constant speed: nearly twice the bytes.
 
     """
 
-    def __init__(self, machine: str, channels: Sequence[Channel], topics: Topics) -> None:
-        self._machine, self._topics = machine, topics
+    def __init__(
+        self, machine: str, channels: Sequence[Channel], topics: Topics, *,
+        wants_steady: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._machine, self._topics, self._wants_steady = machine, topics, wants_steady
         self._joint_states = JointStateWriter(channels, machine)
         self._housings = [column for column, channel in enumerate(channels)
                           if channel.is_housing]
@@ -221,7 +226,7 @@ class Encoder:
             rms = velocity[:, self._housings] / math.sqrt(2.0)
             yield Records(topics.velocity_rms, JOINT_STATE, stamps, self._velocities.write_parts(
                 stamps, np.full((len(rms), 2, rms.shape[1]), np.nan), rms))
-        if (steady := event.steady) is not None:
+        if (steady := event.steady) is not None and self._wants_steady():
             if steady is not event.prediction:  # else the same bytes are said of both
                 amplitude = write(stamps, *moduli(steady))
                 phase = write(stamps, *phases(steady))

@@ -1,5 +1,6 @@
 """What is published and logged is what the plain mapping would say, message by message."""
 
+from dataclasses import replace
 import json
 import math
 
@@ -99,6 +100,16 @@ def test_amplitude_and_phase_carry_displacement_velocity_and_force():
             np.testing.assert_allclose(getattr(size, name), np.abs(vector[row]), rtol=1e-15)
             np.testing.assert_allclose(
                 getattr(angle, name), np.angle(vector[row]), rtol=1e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize('wanted', [True, False])
+def test_what_is_done_at_constant_speed_is_said_where_somebody_hears_it(wanted):
+    told = event(3)
+    told = replace(told, steady=told.prediction)
+    said = Encoder('m', NAMES, Topics.of('', 'm'), wants_steady=lambda: wanted).encode(told)
+    assert [records.topic for records in said] == [
+        f'/rotorsoil/m/{name}' for name in ('amplitude', 'phase', 'velocity_rms', *(
+            ('steady/amplitude', 'steady/phase') if wanted else ()))]
 
 
 @pytest.mark.parametrize('count', [2, 7, 64, 1000])
