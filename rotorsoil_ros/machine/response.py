@@ -335,16 +335,10 @@ class Predictor:
         if not len(rows):
             return steady
         count = len(self.channels)
-        parts, velocity = steady.parts.copy(), np.empty((len(rows), 2, count))
-        motions = self._motions
-        for number, row in enumerate(rows.tolist()):
-            deviation = deviations[row]
-            assert deviation is not None
-            away, changing = (np.concatenate([part.real, part.imag])[:, None]
-                              for part in deviation)
-            # Element by element in one order, unlike those of a matrix product.
-            parts[row] += (away * self.strength).sum(axis=0).reshape(2, 2, count)
-            velocity[number] = (changing * motions).sum(axis=0).reshape(2, count)
+        parts = steady.parts.copy()
+        away, changing = (np.array(part) for part in zip(*filter(None, deviations), strict=True))
+        parts[rows] += _in_order(away, self.strength).reshape(-1, 2, 2, count)
+        velocity = _in_order(changing, self._motions).reshape(-1, 2, count)
         turning = steady.speed[rows, None]
         velocity[:, 0] -= turning * parts[rows, 1, 0]
         velocity[:, 1] += turning * parts[rows, 0, 0]
@@ -382,3 +376,14 @@ class Predictor:
         return OutOfTableError(
             f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and off '
             f'undamped resonances, got {rad_s_to_rpm(speed):g} rpm')
+
+
+def _in_order(weights: ComplexArray, columns: FloatArray) -> FloatArray:
+    """Return sums over (m, k) weights of (2 k, w) columns, in one order for any m, (m, w)."""
+    parts = np.concatenate([weights.real, weights.imag], axis=1)
+    if len(parts) == 1:
+        return np.asarray((parts[0][:, None] * columns).sum(axis=0)[None])
+    total = parts[:, :1] * columns[0]
+    for index in range(1, len(columns)):
+        total += parts[:, index, None] * columns[index]
+    return np.asarray(total)

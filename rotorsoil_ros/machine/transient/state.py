@@ -1,9 +1,10 @@
 """How far a machine is from its steady response, now that its speed has changed: in steps."""
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import wofz
@@ -149,8 +150,21 @@ class Transient:
             When [ns], and which [rad/s]; NaN where none is answered.
 
         """
-        return [self._take(stamp, value) for stamp, value in zip(
-            stamp_ns.tolist(), speed.tolist(), strict=True)]
+        if len(speed) == 1:  # message by message
+            return [self._take(int(stamp_ns[0]), float(speed[0]))]
+        answered = np.flatnonzero(np.isfinite(speed))
+        ways = dict(zip(answered[1:].tolist(), self._ways(stamp_ns[answered], speed[answered]),
+                        strict=True)) if len(answered) > 1 else {}
+        return [self._take(stamp, value, ways.get(row)) for row, (stamp, value) in enumerate(zip(
+            stamp_ns.tolist(), speed.tolist(), strict=True))]
+
+    def _ways(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator['_Way']:
+        """Yield the ways from each speed to the next, found element by element at once."""
+        rate = self._decay - 1j * (speed[:, None] * self.turns)
+        time = np.diff(stamp_ns) * _NANOSECOND
+        with np.errstate(all='ignore'):  # what goes back or nowhere is not taken
+            gone, driven = step(rate[:-1], rate[1:], np.where(time > 0.0, time, 1.0)[:, None])
+        return map(_Way, rate[:-1], rate[1:], gone, driven)
 
     def at(self, stamp_ns: int, speed: float) -> Deviation:
         """
@@ -171,9 +185,9 @@ class Transient:
             share = since / (after.stamp_ns - before.stamp_ns)
             between += share * (after.speed - before.speed)
         envelopes = self._stepped(before, between, since * _NANOSECOND)
-        return None if envelopes is None else self._deviation(envelopes, speed)
+        return None if envelopes is None else _deviation(envelopes, self.rate(speed))
 
-    def _take(self, stamp: int, speed: float) -> Deviation:
+    def _take(self, stamp: int, speed: float, way: '_Way | None' = None) -> Deviation:
         if not math.isfinite(speed):
             return None
         now, envelopes, deviation = self._now, None, None
@@ -183,34 +197,45 @@ class Transient:
                 self._began.clear()
             self._began.append(stamp)
         else:
-            envelopes = self._stepped(now, speed, (stamp - now.stamp_ns) * _NANOSECOND)
+            envelopes = self._stepped(now, speed, (stamp - now.stamp_ns) * _NANOSECOND, way)
         if envelopes is not None:
-            deviation = self._deviation(envelopes, speed)
+            deviation = _deviation(envelopes, self.rate(speed) if way is None else way.after)
             if (np.abs(deviation[1]) < _NOTHING).all():
                 envelopes = deviation = None
         self._now = _Moment(stamp, speed, envelopes)
         self._past.append(self._now)
         return deviation
 
-    def _deviation(
-        self, envelopes: ComplexArray, speed: float,
-    ) -> tuple[ComplexArray, ComplexArray]:
-        rate = self.rate(speed)
-        share = 1.0 + envelopes * rate
-        return share / rate, share
-
     def rate(self, speed: float) -> ComplexArray:
         """Return A = (1 - g) (lambda - i Omega) of all vibrations, (k,) [1/s]."""
         return np.asarray(self._decay - 1j * (speed * self.turns))
 
-    def _stepped(self, moment: _Moment, speed: float, time: float) -> ComplexArray | None:
+    def _stepped(
+        self, moment: _Moment, speed: float, time: float, way: '_Way | None' = None,
+    ) -> ComplexArray | None:
         """Return the envelopes when the speed has gone evenly to another; None if still steady."""
         envelopes = moment.envelopes
         if envelopes is None:
             if speed == moment.speed or not len(self.turns):
                 return None
-            envelopes = -1.0 / self.rate(moment.speed)
+            envelopes = -1.0 / (self.rate(moment.speed) if way is None else way.before)
         if time <= 0.0:  # the same moment told twice: the newer speed is taken, nothing has moved
             return envelopes
+        if way is not None:
+            return way.gone * envelopes + way.driven
         gone, driven = step(self.rate(moment.speed), self.rate(speed), time)
         return gone * envelopes + driven
+
+
+class _Way(NamedTuple):
+    """From one speed to the next: A at both, and what `step` tells, (k,) each."""
+
+    before: ComplexArray
+    after: ComplexArray
+    gone: ComplexArray
+    driven: ComplexArray
+
+
+def _deviation(envelopes: ComplexArray, rate: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    share = 1.0 + envelopes * rate
+    return share / rate, share
