@@ -8,11 +8,11 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.case.design.influence import on_larger_blocks
-from rotorsoil_ros.case.design.inputs import INPUTS
+from rotorsoil_ros.case.design.inputs import INPUTS, input_of
 from rotorsoil_ros.case.design.report import Acceptance, HousingAnswer
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
-from rotorsoil_ros.machine.spread import SoilSpread
+from rotorsoil_ros.machine.spread import OF_LAYER, SoilSpread
 from rotorsoil_ros.units import rpm_to_rad_s
 
 FAN = Path(__file__).parents[2] / 'config' / 'plant_fan.yaml'
@@ -110,8 +110,10 @@ def test_unbalance_that_is_not_known_scales_the_answer(report, tmp_path):
 
 
 def test_every_input_has_words():
-    spread = set(SoilSpread.__dataclass_fields__) - {'samples', 'model_form'}
+    spread = set(SoilSpread.__dataclass_fields__) - {'samples', 'model_form', 'layers', OF_LAYER}
     assert set(INPUTS) == spread
+    own = SoilSpread(layer_stiffness_factor=2.0, layers=3).inputs(with_soil=True)
+    assert 'stiffness of layer 3' in [input_of(name).words for name in own]
 
 
 @pytest.mark.parametrize('moment, verdict, said', [
