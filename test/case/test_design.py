@@ -8,7 +8,7 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.case.design.influence import on_larger_blocks
-from rotorsoil_ros.case.design.inputs import INPUTS, input_of
+from rotorsoil_ros.case.design.inputs import input_of, INPUTS
 from rotorsoil_ros.case.design.report import Acceptance, HousingAnswer
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
