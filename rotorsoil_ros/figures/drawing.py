@@ -38,6 +38,7 @@ _MEGA = 1e-6
 _LAYERS = (SOIL, '#b39468', '#d8c39c', '#a88b62')
 # Of the height of the machine, that the ground below it may take; of a block, the gap beside it.
 _DEEPEST = 1.2
+_LEVEL = '#0072b2'
 _GAP = 0.06
 
 
@@ -233,10 +234,12 @@ def _housing_size(case: Case, bearing: Bearing) -> float:
 
 
 def _drawn_depth(case: Case, top: float) -> float:
-    """Return how much of what lies below the contact is drawn [m]: all layers, if not too deep."""
-    if case.ground is None or not case.ground.layers:
+    """Return how much of what lies below the contact is drawn [m]: layers, rock that may be."""
+    layers = 0.0 if case.ground is None else case.ground.depth
+    shallowest = (case.uncertainty.rock_depth or (0.0,))[0]
+    if not layers and not shallowest:
         return 0.1 * top
-    below = case.ground.depth - _surface(case)
+    below = max(layers, shallowest) - _surface(case)
     return min(1.15 * below, _DEEPEST * top) if below > 0.0 else 0.3 * top
 
 
@@ -271,6 +274,22 @@ def _draw_ground(axes: Axes, case: Case, *, words: bool) -> None:
         axes.axhline(end, color='black', linewidth=0.6, linestyle=':', zorder=0.5)
     if surface:
         _draw_gaps(axes, case, across=not words)
+    spread = case.uncertainty
+    if spread.ground_water:
+        _draw_level(axes, surface, 'ground water may stand here', words=words)
+    if spread.rock_depth is not None and surface - spread.rock_depth[0] > bottom:
+        _draw_level(axes, surface - spread.rock_depth[0], 'from here on there may be rock',
+                    words=words)
+
+
+def _draw_level(axes: Axes, height: float, text: str, *, words: bool) -> None:
+    """Draw what is not known to be at a height, at the edge that layers leave free."""
+    axes.axhline(height, color=_LEVEL, linewidth=1.2, linestyle='--', zorder=0.6)
+    if words:
+        axes.annotate(
+            text, (axes.get_xlim()[1], height), xytext=(-3, -2), va='top', ha='right',
+            fontsize=6.5, color=_LEVEL, textcoords='offset points', zorder=1.5,
+            bbox={'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0})
 
 
 def _draw_gaps(axes: Axes, case: Case, *, across: bool) -> None:

@@ -98,6 +98,19 @@ def test_layers_rock_and_the_gap_beside_a_block_are_drawn_to_scale():
     assert {text.get_text() for text in side.texts} >= {'rigid rock', 'c_s = 229 m/s'}
 
 
+def test_water_and_rock_that_may_be_there_are_drawn_where_they_begin():
+    case = load(FAN, ['support.model=infinite_elements',
+                      'uncertainty={ground_water: true, rock_depth: [2.5, .inf]}'])
+    side = machine_drawing(case).axes[0]
+    levels = {float(line.get_ydata()[0]) for line in side.get_lines()
+              if line.get_linestyle() == '--'}
+    assert levels >= {0.0, -2.5}
+    assert side.get_ylim()[0] < -2.5
+    said = ' '.join(text.get_text() for text in side.texts)
+    assert 'ground water may stand here' in said
+    assert 'from here on there may be rock' in said
+
+
 def test_cut_offs_are_marked_in_the_compliance():
     layers = ThinLayerModel.solved(
         LayeredSoil((Layer(3.0, SAND),), None), Circle(1.0), omega_max=250.0)
