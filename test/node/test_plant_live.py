@@ -7,6 +7,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 import yaml
 
+import rotorsoil_ros as rs
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.plant.together import Plant
 
@@ -62,3 +63,15 @@ def test_geared_machine_turns_with_the_other(bench, tmp_path):
     fan = Plant.load(case, cache_directory=Path(bench.cache)).machines['fan_2']
     looked_up = fan.table.predictor(fan.case.unbalance).predict(np.array([75.0]))
     np.testing.assert_allclose(slow[0].position, np.abs(looked_up.displacement[0]), rtol=1e-9)
+
+
+def test_blocks_on_one_ground_and_a_probe_in_the_yard_are_answered(bench, cache):
+    bench.active('fan', fan__case='fan_on_l_block')
+    told = bench.answers('fan')[0]
+    bench.speaker('/fan/joint_states')(joint_state([150.0]))
+    bench.graph.until(lambda: told, 'the answer')
+    fan = rs.load(CONFIG / 'fan_on_l_block.yaml', cache_directory=cache)
+    looked_up = fan.table.predictor(fan.case.unbalance).predict(np.array([150.0]))
+    assert list(told[0].name) == list(map(str, fan.table.channels))
+    assert {'yard_z', 'next_block_z'} <= set(told[0].name)
+    np.testing.assert_allclose(told[0].position, np.abs(looked_up.displacement[0]), rtol=1e-12)
