@@ -1,7 +1,6 @@
 """The coefficients of a bearing or seal that ROSS has saved, over our axes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import re
 from typing import Any, TypeAlias
 
@@ -9,7 +8,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.case.ross.file import RossFile, Table
+from rotorsoil_ros.case.ross.file import RossReader, Table
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Our keys, the letter of ROSS and the unit.
@@ -25,23 +24,8 @@ _FINER = 4
 Matrix: TypeAlias = dict[str, Any]
 
 
-@dataclass
-class CoefficientReader:
-    """
-    Turns coefficients into what a case holds of them, noting what does not fit.
-
-    Attributes
-    ----------
-    file : RossFile
-        The saved rotor.
-    assumed, lost : lists of str
-        Where it notes what was decided, and what could not be carried over.
-
-    """
-
-    file: RossFile
-    assumed: list[str]
-    lost: list[str]
+class CoefficientReader(RossReader):
+    """Turns coefficients into what a case holds of them, noting what does not fit."""
 
     def read(self, title: str, table: Table) -> dict[str, Matrix]:
         """Return stiffness and damping, and inertia where there is some."""

@@ -130,3 +130,22 @@ class RossFile:
         if not values:
             return [self.kept(f'{title}.{key}', 'is empty')]
         return [float(value) for value in values]
+
+
+@dataclass
+class RossReader:
+    """
+    Turns a part of a file into what a case holds of it.
+
+    Attributes
+    ----------
+    file : RossFile
+        The saved rotor.
+    assumed, lost : lists of str
+        Where it notes what was decided, and what could not be carried over.
+
+    """
+
+    file: RossFile
+    assumed: list[str]
+    lost: list[str]

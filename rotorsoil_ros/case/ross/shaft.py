@@ -1,13 +1,12 @@
 """The shaft of a rotor that ROSS has saved: its pieces, and the layers that lie on them."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 import math
 from typing import Any
 
 from rotorsoil_ros.case.document import shown
-from rotorsoil_ros.case.ross.file import RossFile, Table
+from rotorsoil_ros.case.ross.file import RossReader, Table
 
 _SAME = 1e-12
 _TOUCHING = 1e-9
@@ -17,23 +16,8 @@ _LOADS = ('axial_force', 'torque', 'external_damping')
 _SHAFT_EFFECTS = ('shear_effects', 'rotary_inertia', 'gyroscopic')
 
 
-@dataclass
-class ShaftReader:
-    """
-    Turns the shaft elements of a file into sections, noting what does not fit.
-
-    Attributes
-    ----------
-    file : RossFile
-        The saved rotor.
-    assumed, lost : lists of str
-        Where it notes what was decided, and what could not be carried over.
-
-    """
-
-    file: RossFile
-    assumed: list[str]
-    lost: list[str]
+class ShaftReader(RossReader):
+    """Turns the shaft elements of a file into sections, noting what does not fit."""
 
     def shaft(self) -> tuple[list[dict[str, Any]], dict[int, float]]:
         """Return the sections and the place of each node along them."""

@@ -108,6 +108,15 @@ class _Moment:
     envelopes: ComplexArray | None
 
 
+class _Way(NamedTuple):
+    """From one speed to the next: A at both, and what `step` tells, (k,) each."""
+
+    before: ComplexArray
+    after: ComplexArray
+    gone: ComplexArray
+    driven: ComplexArray
+
+
 class Transient:
     """
     Follows the vibrations that a changing speed strikes.
@@ -158,7 +167,7 @@ class Transient:
         return [self._take(stamp, value, ways.get(row)) for row, (stamp, value) in enumerate(zip(
             stamp_ns.tolist(), speed.tolist(), strict=True))]
 
-    def _ways(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator['_Way']:
+    def _ways(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[_Way]:
         """Yield the ways from each speed to the next, found element by element at once."""
         rate = self._decay - 1j * (speed[:, None] * self.turns)
         time = np.diff(stamp_ns) * _NANOSECOND
@@ -187,7 +196,7 @@ class Transient:
         envelopes = self._stepped(before, between, since * _NANOSECOND)
         return None if envelopes is None else _deviation(envelopes, self.rate(speed))
 
-    def _take(self, stamp: int, speed: float, way: '_Way | None' = None) -> Deviation:
+    def _take(self, stamp: int, speed: float, way: _Way | None = None) -> Deviation:
         if not math.isfinite(speed):
             return None
         now, envelopes, deviation = self._now, None, None
@@ -211,7 +220,7 @@ class Transient:
         return np.asarray(self._decay - 1j * (speed * self.turns))
 
     def _stepped(
-        self, moment: _Moment, speed: float, time: float, way: '_Way | None' = None,
+        self, moment: _Moment, speed: float, time: float, way: _Way | None = None,
     ) -> ComplexArray | None:
         """Return the envelopes when the speed has gone evenly to another; None if still steady."""
         envelopes = moment.envelopes
@@ -225,15 +234,6 @@ class Transient:
             return way.gone * envelopes + way.driven
         gone, driven = step(self.rate(moment.speed), self.rate(speed), time)
         return gone * envelopes + driven
-
-
-class _Way(NamedTuple):
-    """From one speed to the next: A at both, and what `step` tells, (k,) each."""
-
-    before: ComplexArray
-    after: ComplexArray
-    gone: ComplexArray
-    driven: ComplexArray
 
 
 def _deviation(envelopes: ComplexArray, rate: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
