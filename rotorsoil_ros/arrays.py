@@ -1,13 +1,13 @@
 """The array types of the floor, and what is taken for one."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rotorsoil_ros.errors import RotorSoilError
+from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
@@ -15,6 +15,9 @@ AnyArray: TypeAlias = npt.NDArray[np.inexact[Any]]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 Numbers: TypeAlias = float | Sequence[float] | FloatArray
+
+# By which an end of a table may be passed, of itself: units go to and fro.
+ROUNDING = 1e-12
 
 
 def prominent_peaks(level: FloatArray, prominence: float) -> list[int]:
@@ -58,3 +61,27 @@ def numbers(name: str, given: Numbers) -> FloatArray:
     if len(wrong):
         raise RotorSoilError(f'{name} must be >= 0 and finite, got {wrong[0]:g}')
     return found
+
+
+def inside(
+    given: FloatArray, span: tuple[float, float], *, name: str, unit: str, where: str,
+    shown: Callable[[float], float] = float,
+) -> FloatArray:
+    """
+    Return numbers within the ends of a table; what rounding has put beyond them is on them.
+
+    Raises
+    ------
+    OutOfTableError
+        If one lies outside; the message says what must be where and got which value, all in
+        the unit as it is shown.
+
+    """
+    low, high = span
+    held: FloatArray = np.clip(np.asarray(given, dtype=float), low, high)
+    outside = ~(np.abs(given - held) <= ROUNDING * np.abs(held))
+    if outside.any():
+        raise OutOfTableError(
+            f'{name} must be in [{shown(low):g}, {shown(high):g}] {unit}, {where}, got '
+            f'{shown(float(np.asarray(given)[outside][0])):g}')
+    return held

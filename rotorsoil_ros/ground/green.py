@@ -9,8 +9,8 @@ import math
 import numpy as np
 from scipy.special import jv
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside, IntArray
+from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
 from rotorsoil_ros.ground.soil import Soil
 
 # To be raised whenever other numbers come out of the same grid.
@@ -255,11 +255,9 @@ class GreenModel:
             If a frequency is beyond `omega_range`.
 
         """
+        omega = inside(omega, self.omega_range, name='frequency', unit='rad/s',
+                       where='where the coupling of patches was solved')
         a0 = omega * self.radii[0] / self.soil.shear_wave_speed
-        if not np.all((a0 >= 0.0) & (a0 <= self.table.highest * (1.0 + 1e-12))):
-            raise OutOfTableError(
-                f'frequency must be in [0, {self.omega_range[1]:g}] rad/s, where the coupling of '
-                f'patches was solved, got {omega.max():g}')
         count = len(self.places)
         _, which = self._pairs
         vertical, mean, difference = np.moveaxis(self.table.at(a0)[:, which], -1, 0) / (

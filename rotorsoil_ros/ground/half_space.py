@@ -5,12 +5,11 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside
+from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.elements.table import (
     DimensionlessTable,
     require_kind,
-    ROUNDING,
     standard_range,
 )
 from rotorsoil_ros.ground.soil import Circle, Contact, equivalent_radii, Rectangle, Soil
@@ -146,20 +145,12 @@ class InfiniteElementModel:
             If a frequency lies outside `omega_range`.
 
         """
-        omega = np.asarray(omega, dtype=float)
-        self._require_inside(omega)
+        omega = inside(omega, self.omega_range, name='frequency', unit='rad/s',
+                       where='where the infinite elements were solved')
         flat = omega.ravel()
         is_disc = self.table.geometry == 'disc'
         compliance = self._disc(flat) if is_disc else self._strip(flat)
         return compliance.reshape(*omega.shape, 6, 6)
-
-    def _require_inside(self, omega: FloatArray) -> None:
-        lowest, highest = self.omega_range
-        inside = (omega >= lowest * (1.0 - ROUNDING)) & (omega <= highest * (1.0 + ROUNDING))
-        if not inside.all():
-            raise OutOfTableError(
-                f'frequency must be in [{lowest:g}, {highest:g}] rad/s, where the infinite '
-                f'elements were solved, got {omega[~inside][0]:g}')
 
     def _entries(self, omega: FloatArray, length: float) -> ComplexArray:
         a0 = omega * (length / self.soil.shear_wave_speed)

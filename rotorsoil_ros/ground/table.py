@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside
 from rotorsoil_ros.channel import DOFS
-from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.errors import RotorSoilError
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -88,12 +88,8 @@ class ComplianceTable:
             If a frequency lies outside the table.
 
         """
-        omega = np.asarray(omega, dtype=float)
-        inside = (omega >= self.omega[0]) & (omega <= self.omega[-1])
-        if not inside.all():
-            raise OutOfTableError(
-                f'frequency must be in [{self.omega[0]:g}, {self.omega[-1]:g}] rad/s, the range '
-                f'of the compliance table, got {omega[~inside][0]:g}')
+        omega = inside(omega, (float(self.omega[0]), float(self.omega[-1])), name='frequency',
+                       unit='rad/s', where='the range of the compliance table')
         if not self.cut_offs:
             whole: ComplexArray = self._splines[0](omega)
             return whole

@@ -1,13 +1,13 @@
 """What holds the shaft: bearings and seals, their tables, and their pedestals."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside
+from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.rotor.coefficients import (
     at,
     Coefficients,
@@ -18,9 +18,6 @@ from rotorsoil_ros.rotor.coefficients import (
     values,
 )
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
-
-# Share of a speed by which round-off may put it beyond a table.
-_ROUNDING = 1e-12
 
 _UNITS = {'stiffness': 'N/m', 'damping': 'N s/m', 'inertia': 'kg'}
 
@@ -156,25 +153,13 @@ class Bearing:
             If a table does not cover a speed or a frequency: nothing is extrapolated.
 
         """
-        held = self._held(speed, self.speed_range, 'speed', rad_s_to_rpm, 'rpm')
-        swung = self._held(omega, self.frequency_range, 'frequency', rad_s_to_hz, 'Hz')
+        where = f'the table of {self.name}'
+        held = inside(speed, self.speed_range, name='speed', unit='rpm', shown=rad_s_to_rpm,
+                      where=where)
+        swung = inside(omega, self.frequency_range, name='frequency', unit='Hz',
+                       shown=rad_s_to_hz, where=where)
         stiffness, damping, inertia = (at(matrix, held, swung) for matrix in self.matrices)
         return stiffness, damping, inertia
-
-    def _held(
-        self, given: FloatArray, span: tuple[float, float], what: str,
-        shown: Callable[[float], float], unit: str,
-    ) -> FloatArray:
-        """Return what is within a table, or raise an OutOfTableError."""
-        low, high = span
-        # What lies at the end of a table may come back from a sweep by a rounding beyond it.
-        held = np.clip(given, low, high)
-        outside = ~(np.abs(given - held) <= _ROUNDING * np.abs(given))
-        if np.any(outside):
-            raise OutOfTableError(
-                f'{what} must be within {shown(low):g} to {shown(high):g} {unit}, the '
-                f'table of {self.name}, got {shown(float(given[outside][0])):g} {unit}')
-        return held
 
     def dynamic_stiffness(self, omega: FloatArray, speed: FloatArray) -> ComplexArray:
         """Return K + i omega C - omega^2 M, (n, 2, 2) over (x, z) [N/m]."""

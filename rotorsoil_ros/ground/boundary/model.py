@@ -5,15 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import OutOfTableError, require, RotorSoilError
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside
+from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.ground.boundary.effort import highest_a0
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BoundaryTable
 from rotorsoil_ros.ground.soil import Contact, Soil, static_scale
 
 # A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-_ROUNDING = 1e-12
 
 
 class SiteGround(ABC):
@@ -85,13 +84,8 @@ class SiteGround(ABC):
         return self._values(omega)[..., 6 * self.blocks:, :]
 
     def _values(self, omega: FloatArray) -> ComplexArray:
-        omega = np.asarray(omega, dtype=float)
-        highest = self.omega_range[1]
-        inside = (omega >= 0.0) & (omega <= highest * (1.0 + _ROUNDING))
-        if not inside.all():
-            raise OutOfTableError(
-                f'frequency must be in [0, {highest:g}] rad/s, where the boundary elements were '
-                f'solved, got {omega[~inside][0]:g}')
+        omega = inside(omega, self.omega_range, name='frequency', unit='rad/s',
+                       where='where the boundary elements were solved')
         a0 = np.minimum(omega.ravel() / self.unit, self.a0_max)
         return self._dimensioned(self.scaled_values(a0)).reshape(
             *omega.shape, -1, 6 * self.blocks)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import OutOfTableError, require, RotorSoilError
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside, ROUNDING
+from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.ground.infinite_rational import RationalFunction
 from rotorsoil_ros.ground.joining import laplace_point
 
@@ -21,8 +21,6 @@ DISC_ENTRIES = (*PLANE_ENTRIES, 'rzrz')
 LARGEST_POISSON_RATIO = 0.49
 LARGEST_A0 = 20.0
 SMALLEST_A0 = 0.005
-# A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-ROUNDING = 1e-12
 
 
 def require_kind(geometry: str, poisson_ratio: float, loss_factor: float) -> None:
@@ -127,12 +125,8 @@ class DimensionlessTable:
             If a frequency lies outside the range that was solved.
 
         """
-        inside = ((a0 >= self.a0_min * (1.0 - ROUNDING))
-                  & (a0 <= self.a0_max * (1.0 + ROUNDING)))
-        if not inside.all():
-            raise OutOfTableError(
-                f'a0 must be in [{self.a0_min:g}, {self.a0_max:g}] [-], the range of the table, '
-                f'got {a0[~inside][0]:g}')
+        a0 = inside(a0, (self.a0_min, self.a0_max), name='a0', unit='[-]',
+                    where='the range of the table')
         return (self.function(laplace_point(a0, self.loss_factor))
                 / (1.0 + 1j * self.loss_factor))
 

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import OutOfTableError, require
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside, ROUNDING
+from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.half_space import keep_passive
 from rotorsoil_ros.ground.layers.profile import (
     Embedment,
@@ -30,7 +30,6 @@ _ENDS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
 _DIGITS = 11
 
 # A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +73,7 @@ class Proportions:
         length, soil = radii[0], ground.at(embedment.depth)
         require_thickness(ground, min(radii))
         a0 = omega_max * length / soil.shear_wave_speed
-        end = next((end for end in _ENDS if a0 <= end * (1.0 + _ROUNDING)), math.nan)
+        end = next((end for end in _ENDS if a0 <= end * (1.0 + ROUNDING)), math.nan)
         require(math.isfinite(end), 'a0', f'<= {_ENDS[-1]:g} [-] for layered ground', a0)
 
         def ratio(value: float) -> float:
@@ -190,15 +189,11 @@ class ThinLayerModel:
             If a frequency lies outside `omega_range`.
 
         """
-        omega = np.asarray(omega, dtype=float)
+        omega = inside(omega, self.omega_range, name='frequency', unit='rad/s',
+                       where='where layered ground was solved')
         modulus, length, unit = self._unit
-        flat, highest = omega.ravel(), self.omega_range[1]
-        outside = ~((flat >= 0.0) & (flat <= highest * (1.0 + _ROUNDING)))
-        if outside.any():
-            raise OutOfTableError(
-                f'frequency must be in [0, {highest:g}] rad/s, where layered ground was solved, '
-                f'got {flat[outside][0]:g}')
-        entries = self.table.compliance(np.minimum(flat / unit, self.table.edges[-1]))
+        flat = omega.ravel()
+        entries = self.table.compliance(flat / unit)
         xx, zz, rxrx, ryry, rzrz, x_ry, y_rx = (entries / modulus).T
         total = np.zeros((flat.size, 6, 6), dtype=complex)
         for dof, values, power in ((0, xx, 1), (1, xx, 1), (2, zz, 1), (3, rxrx, 3),

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside
+from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.rational import RationalMatrix
 
 ENTRIES = ('xx', 'zz', 'rxrx', 'ryry', 'rzrz', 'x_ry', 'y_rx')
 
 # A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,11 +56,8 @@ class LayeredTable:
             If a frequency lies outside the range that was solved.
 
         """
-        inside = (a0 >= 0.0) & (a0 <= self.edges[-1] * (1.0 + _ROUNDING))
-        if not inside.all():
-            raise OutOfTableError(
-                f'a0 must be in [0, {self.edges[-1]:g}] [-], the range of the table, got '
-                f'{a0[~inside][0]:g}')
+        a0 = inside(a0, (0.0, float(self.edges[-1])), name='a0', unit='[-]',
+                    where='the range of the table')
         piece = np.clip(np.searchsorted(self.edges, a0, side='right') - 1, 0,
                         len(self.pieces) - 1)
         values = np.zeros((len(a0), self.pieces[0].values.shape[1]), dtype=complex)
