@@ -1,6 +1,6 @@
 """Where tables wait for the next start, and how one knows that they are the right ones."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 import hashlib
 import json
@@ -8,7 +8,7 @@ import logging
 import os
 from pathlib import Path
 import tempfile
-from typing import Any
+from typing import Any, Protocol, TypeVar
 import zipfile
 import zlib
 
@@ -26,6 +26,17 @@ _LOG = logging.getLogger(__name__)
 # What reading a damaged or foreign .npz raises.
 _UNREADABLE = (OSError, EOFError, KeyError, ValueError, TypeError, MemoryError, RuntimeError,
                zipfile.BadZipFile, zlib.error)
+
+
+class Storable(Protocol):
+    """A table that can be taken apart."""
+
+    def to_arrays(self) -> dict[str, Any]:
+        """Return all of it as plain arrays."""
+        ...
+
+
+_Table = TypeVar('_Table', bound=Storable)
 
 
 def directory(chosen: str | Path | None = None) -> Path:
@@ -98,6 +109,18 @@ class Cache:
     def path(self, kind: str, key: str) -> Path:
         """Return the file that holds, or would hold, the arrays of a key."""
         return self.directory / f'{kind}_{key}.npz'
+
+    def kept(
+        self, kind: str, key: str, *, rebuild: Callable[[dict[str, Any]], _Table],
+        solve: Callable[[], _Table],
+    ) -> _Table:
+        """Return the table of a key, rebuilt of what is stored, or solved and stored now."""
+        stored = self.load(kind, key)
+        if stored is not None:
+            return rebuild(stored)
+        table = solve()
+        self.store(kind, key, table.to_arrays())
+        return table
 
     def load(self, kind: str, key: str) -> dict[str, np.ndarray] | None:
         """Return the arrays stored under a key, or None if they have to be computed."""

@@ -99,16 +99,6 @@ def _among(model: CoupledModel) -> list[object]:
     return [model.place, list(model.neighbours), model.index]
 
 
-def stored_response_table(
-    case: Case, model: CoupledModel, directory: Path,
-) -> ResponseTable | None:
-    """Return the response table of a case if the cache holds it."""
-    key = response_key(case, model)
-    arrays = Cache(directory).load('response', key)
-    return None if arrays is None else _followed(case, ResponseTable.from_arrays(
-        arrays, model.channels, key=key))
-
-
 def _followed(case: Case, table: ResponseTable) -> ResponseTable:
     """Return a table that follows changes of the speed only if the case wants it."""
     if case.run_up == 'transient':
@@ -135,14 +125,13 @@ def response_table(case: Case, model: CoupledModel, directory: Path) -> Response
         If the case cannot be solved.
 
     """
-    stored = stored_response_table(case, model, directory)
-    if stored is not None:
-        return stored
+    key = response_key(case, model)
     with solved('the response of this machine'):
-        table = replace(ResponseTable.build(model, case.speed_range),
-                        key=response_key(case, model))
-    Cache(directory).store('response', table.key, table.to_arrays())
-    return _followed(case, table)
+        table = Cache(directory).kept(
+            'response', key, rebuild=lambda arrays: ResponseTable.from_arrays(
+                arrays, model.channels),
+            solve=lambda: ResponseTable.build(model, case.speed_range))
+    return _followed(case, replace(table, key=key))
 
 
 def response_band(

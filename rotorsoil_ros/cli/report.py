@@ -125,12 +125,11 @@ def tabulate(arguments: Namespace) -> int:
         start = time.perf_counter()
         model = models.coupled_model(case, directory)
         soil_seconds = time.perf_counter() - start
-    how, start = 'loaded', time.perf_counter()
-    table = models.stored_response_table(case, model, directory)
-    if table is None:
-        how = 'computed'
-        with progress('solving') as _:
-            table = models.response_table(case, model, directory)
+    is_stored = cache.Cache(directory).path(
+        'response', models.response_key(case, model)).is_file()
+    start = time.perf_counter()
+    with progress('solving') as _:
+        table = models.response_table(case, model, directory)
     seconds = time.perf_counter() - start
     for names, soil in zip(models.blocks_on_each(model), model.soil_models, strict=True):
         _print_table(_compliance(names, soil, directory))
@@ -141,7 +140,7 @@ def tabulate(arguments: Namespace) -> int:
         strict=True)]
     low, high = table.speed_range
     _print_table([
-        ('response table', f'{how} in {seconds:.3g} s'),
+        ('response table', f'{"loaded" if is_stored else "computed"} in {seconds:.3g} s'),
         ('covers', f'{rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm, '
                    f'{len(table.channels)} channels, {len(table.planes)} unbalance planes'),
         ('pieces', f'{len(table.pieces.resolved)} polynomials'),

@@ -222,7 +222,7 @@ class ResponseTable:
 
     @classmethod
     def from_arrays(
-        cls, arrays: dict[str, np.ndarray], channels: tuple[Channel, ...], *, key: str = '',
+        cls, arrays: dict[str, np.ndarray], channels: tuple[Channel, ...],
     ) -> 'ResponseTable':
         """Rebuild a table from `to_arrays` and the channels of its model."""
         return cls(
@@ -230,8 +230,8 @@ class ResponseTable:
             tuple(str(name) for name in arrays['planes']),
             arrays['transmits_force'],
             Pieces(arrays['edges'], arrays['resolved'], arrays['coefficients']),
-            float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])), key,
-            Poles.from_arrays(arrays))
+            float(arrays['accuracy']), Stability.from_json(str(arrays['stability'])),
+            poles=Poles.from_arrays(arrays))
 
 
 def growth_of(model: CoupledModel, high: float) -> Stability:

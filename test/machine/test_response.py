@@ -173,11 +173,11 @@ def test_no_speeds_have_no_answers(table):
 
 
 def test_table_survives_being_written_as_arrays(table):
-    again = ResponseTable.from_arrays(table.to_arrays(), table.channels, key='k')
+    again = ResponseTable.from_arrays(table.to_arrays(), table.channels)
     speed = np.array([123.0, 456.0])
     np.testing.assert_array_equal(again.predictor(UNBALANCE).predict(speed).displacement,
                                   table.predictor(UNBALANCE).predict(speed).displacement)
-    assert (again.channels, again.planes, again.key) == (table.channels, table.planes, 'k')
+    assert (again.channels, again.planes) == (table.channels, table.planes)
     assert again.accuracy == table.accuracy
 
 

@@ -44,12 +44,10 @@ def infinite_element_model(
     low, high = infinite_range(soil, contact, geometry, speed_range)
     key = compliance_key(
         soil, geometry, *a0_range(soil, contact, geometry, omega_min=low, omega_max=high))
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return InfiniteElementModel(soil, contact, DimensionlessTable.from_arrays(stored))
-    model = InfiniteElementModel.solved(soil, contact, geometry, omega_min=low, omega_max=high)
-    cache.store('compliance', key, model.table.to_arrays())
-    return model
+    return InfiniteElementModel(soil, contact, cache.kept(
+        'compliance', key, rebuild=DimensionlessTable.from_arrays,
+        solve=lambda: InfiniteElementModel.solved(
+            soil, contact, geometry, omega_min=low, omega_max=high).table))
 
 
 def thin_layer_model(
@@ -70,14 +68,8 @@ def thin_layer_model(
 
     """
     scaled = proportions(ground, contact, embedment, speed_range)
-    if cache is None:
-        return ThinLayerModel(ground, contact, _layers_once(scaled), embedment)
-    key = layers_key(scaled)
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return ThinLayerModel(ground, contact, LayeredTable.from_arrays(stored), embedment)
-    table = scaled.table()
-    cache.store('compliance', key, table.to_arrays())
+    table = _layers_once(scaled) if cache is None else cache.kept(
+        'compliance', layers_key(scaled), rebuild=LayeredTable.from_arrays, solve=scaled.table)
     return ThinLayerModel(ground, contact, table, embedment)
 
 
@@ -135,15 +127,9 @@ def layered_site_model(
 
     """
     scaled = layered_site(ground, site, speed_range)
-    if cache is None:
-        return LayeredSiteModel(ground, site, _site_once(scaled))
-    key = layered_site_key(scaled)
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return LayeredSiteModel(ground, site, LayeredSiteTable.from_arrays(scaled, stored))
-    table = scaled.table()
-    cache.store('compliance', key, table.to_arrays())
-    return LayeredSiteModel(ground, site, table)
+    return LayeredSiteModel(ground, site, _site_once(scaled) if cache is None else cache.kept(
+        'compliance', layered_site_key(scaled),
+        rebuild=lambda stored: LayeredSiteTable.from_arrays(scaled, stored), solve=scaled.table))
 
 
 @lru_cache(maxsize=64)
@@ -159,16 +145,15 @@ def layered_site_key(scaled: LayeredSite) -> str:
 def _boundary_table(
     site: Site, poisson_ratio: float, loss_factor: float, a0_max: float, cache: Cache,
 ) -> BoundaryTable:
-    key = site_key(site, poisson_ratio, loss_factor, a0_max)
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return BoundaryTable.from_arrays(site, stored)
-    # Here and not above: what solves takes 0.1 s to import, and a stored table needs none.
-    from rotorsoil_ros.ground.boundary.tabulate import tabulated
+    def solve() -> BoundaryTable:
+        # Here and not above: what solves takes 0.1 s to import, and a stored table needs none.
+        from rotorsoil_ros.ground.boundary.tabulate import tabulated
 
-    table = tabulated(site, poisson_ratio=poisson_ratio, loss_factor=loss_factor, a0_max=a0_max)
-    cache.store('compliance', key, table.to_arrays())
-    return table
+        return tabulated(site, poisson_ratio=poisson_ratio, loss_factor=loss_factor,
+                         a0_max=a0_max)
+
+    return cache.kept('compliance', site_key(site, poisson_ratio, loss_factor, a0_max),
+                      rebuild=lambda stored: BoundaryTable.from_arrays(site, stored), solve=solve)
 
 
 def green_model(
@@ -192,12 +177,9 @@ def green_model(
     pairs, _ = pairs_of(places, radii)
     key = content_key('green', GREEN_ALGORITHM, pairs, soil.poisson_ratio, soil.loss_factor,
                       highest * radii[0] / soil.shear_wave_speed)
-    stored = cache.load('compliance', key)
-    if stored is not None:
-        return GreenModel(soil, places, radii, GreenTable.from_arrays(stored))
-    model = GreenModel.solved(soil, places, radii, omega_max=highest)
-    cache.store('compliance', key, model.table.to_arrays())
-    return model
+    return GreenModel(soil, places, radii, cache.kept(
+        'compliance', key, rebuild=GreenTable.from_arrays,
+        solve=lambda: GreenModel.solved(soil, places, radii, omega_max=highest).table))
 
 
 def site_key(site: Site, poisson_ratio: float, loss_factor: float, a0_max: float) -> str:

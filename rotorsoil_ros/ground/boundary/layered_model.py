@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import require, RotorSoilError
+from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.boundary.effort import (
     highest_a0,
     HIGHEST_POISSON_RATIO,
@@ -175,24 +175,9 @@ class LayeredSiteTable:
     def from_arrays(
         cls, of: LayeredSite, arrays: Mapping[str, npt.NDArray[Any]],
     ) -> 'LayeredSiteTable':
-        """
-        Return the table that `to_arrays` took apart.
-
-        Raises
-        ------
-        RotorSoilError
-            If an array is missing, of a wrong shape or not finite.
-
-        """
-        try:
-            entries, loss = np.asarray(arrays['entries'], dtype=int), float(arrays['loss'])
-        except (KeyError, TypeError, ValueError) as error:
-            raise RotorSoilError(f'not a table of a site on layers: {error}') from error
-        size = 6 * len(of.site.blocks)
-        if not (entries.shape[1:] == (2,) and entries[:, 1].max(initial=0) < size
-                and math.isfinite(loss)):
-            raise RotorSoilError('not a table of a site on layers: wrong shapes or not finite')
-        return cls(of, LayeredTable.from_arrays(arrays, len(entries)), entries, loss)
+        """Return the table that `to_arrays` took apart."""
+        return cls(of, LayeredTable.from_arrays(arrays), arrays['entries'],
+                   float(arrays['loss']))
 
 
 @dataclass(frozen=True, slots=True)

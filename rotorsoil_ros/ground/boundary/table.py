@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
-from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.infinite_rational import RationalFunction
 from rotorsoil_ros.ground.joining import laplace_point
@@ -95,31 +94,12 @@ class BoundaryTable:
     def from_arrays(
         cls, site: Site, arrays: Mapping[str, npt.NDArray[Any]],
     ) -> 'BoundaryTable':
-        """
-        Return the table that `to_arrays` took apart.
-
-        Raises
-        ------
-        RotorSoilError
-            If an array is missing, of a wrong shape or not finite.
-
-        """
-        try:
-            kind = np.asarray(arrays['kind'], dtype=float)
-            poisson_ratio, loss_factor, a0_max, measured, solves, unknowns, loss = kind.tolist()
-            function = RationalFunction(*(np.asarray(arrays[name], dtype=complex)
-                                          for name in ('support', 'values', 'weights')))
-            entries = np.asarray(arrays['entries'], dtype=int)
-        except (KeyError, TypeError, ValueError) as error:
-            raise RotorSoilError(f'not a table of boundary elements: {error}') from error
-        parts = function.support, function.values, function.weights, kind
-        size = 6 * len(site.blocks)
-        if not (entries.shape[1:] == (2,) and function.values.shape == (
-                function.support.size, len(entries)) and all(
-                np.isfinite(part).all() for part in parts) and entries[:, 1].max() < size):
-            raise RotorSoilError('not a table of boundary elements: wrong shapes or not finite')
-        return cls(site, poisson_ratio, loss_factor, a0_max, function, entries, measured,
-                   int(solves), int(unknowns), loss)
+        """Return the table that `to_arrays` took apart."""
+        (poisson_ratio, loss_factor, a0_max, measured, solves, unknowns,
+         loss) = arrays['kind'].tolist()
+        function = RationalFunction(*(arrays[name] for name in ('support', 'values', 'weights')))
+        return cls(site, poisson_ratio, loss_factor, a0_max, function, arrays['entries'],
+                   measured, int(solves), int(unknowns), loss)
 
 
 def spread(values: ComplexArray, entries: IntArray, site: Site) -> ComplexArray:

@@ -148,39 +148,13 @@ class DimensionlessTable:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> 'DimensionlessTable':
-        """
-        Return the table that `to_arrays` took apart.
-
-        Raises
-        ------
-        RotorSoilError
-            If an array is missing, has the wrong shape or is not finite.
-
-        """
-        try:
-            support, values, weights = (
-                np.asarray(arrays[name], dtype=complex)
-                for name in ('support', 'values', 'weights'))
-            table = cls(
-                geometry=str(arrays['geometry']),
-                poisson_ratio=float(arrays['poisson_ratio']),
-                loss_factor=float(arrays['loss_factor']),
-                a0_min=float(arrays['a0_min']), a0_max=float(arrays['a0_max']),
-                function=RationalFunction(support, values, weights),
-                measured_error=float(arrays['measured_error']),
-                solves=int(arrays['solves']), unknowns=int(arrays['unknowns']))
-        except (KeyError, TypeError, ValueError) as error:
-            raise RotorSoilError(f'not a table of dimensionless compliances: {error}') from error
-        require_kind(table.geometry, table.poisson_ratio, table.loss_factor)
-        require_range(table.geometry, table.a0_min, table.a0_max)
-        if not (support.shape == weights.shape == (support.size,)
-                and values.shape == (support.size, len(table.entries)) and support.size > 0):
-            raise RotorSoilError(
-                f'not a table of dimensionless compliances: {support.shape} support points, '
-                f'{weights.shape} weights, {values.shape} values')
-        if not all(np.isfinite(part).all() for part in (support, values, weights)):
-            raise RotorSoilError('not a table of dimensionless compliances: not finite')
-        return table
+        """Return the table that `to_arrays` took apart."""
+        nu, eta, low, high = (float(arrays[name]) for name in (
+            'poisson_ratio', 'loss_factor', 'a0_min', 'a0_max'))
+        function = RationalFunction(*(arrays[name] for name in ('support', 'values', 'weights')))
+        return cls(str(arrays['geometry']), nu, eta, low, high, function,
+                   float(arrays['measured_error']), int(arrays['solves']),
+                   int(arrays['unknowns']))
 
 
 def effective_poisson_ratio(geometry: str, poisson_ratio: float) -> float:

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, inside
-from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.rational import RationalMatrix
 
 ENTRIES = ('xx', 'zz', 'rxrx', 'ryry', 'rzrz', 'x_ry', 'y_rx')
@@ -85,38 +83,14 @@ class LayeredTable:
         }
 
     @classmethod
-    def from_arrays(
-        cls, arrays: Mapping[str, npt.NDArray[Any]], width: int = len(ENTRIES),
-    ) -> 'LayeredTable':
-        """
-        Return the table that `to_arrays` took apart, with so many values of a frequency.
-
-        Raises
-        ------
-        RotorSoilError
-            If an array is missing, has the wrong shape or is not finite.
-
-        """
-        try:
-            edges, support = (np.asarray(arrays[name], dtype=float)
-                              for name in ('edges', 'support'))
-            values, weights = (np.asarray(arrays[name], dtype=complex)
-                               for name in ('values', 'weights'))
-            ends = np.cumsum(np.asarray(arrays['sizes'], dtype=int))
-            error = float(arrays['measured_error'])
-            solves, nodes = int(arrays['solves']), int(arrays['nodes'])
-        except (KeyError, TypeError, ValueError) as problem:
-            raise RotorSoilError(f'not a table of layered ground: {problem}') from problem
-        if not (2 * len(edges) == len(ends) + 2 > 2
-                and values.shape == (len(support), width)
-                and weights.shape == support.shape == (ends[-1],)
-                and all(np.isfinite(part).all() for part in (edges, support, values, weights))
-                and math.isfinite(error)):
-            raise RotorSoilError('not a table of layered ground: its arrays do not fit')
-        functions = tuple(map(RationalMatrix, *(np.split(part, ends[:-1])
-                                                for part in (support, values, weights))))
-        half = len(edges) - 1
-        return cls(edges, functions[:half], functions[half:], error, solves, nodes)
+    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> 'LayeredTable':
+        """Return the table that `to_arrays` took apart."""
+        ends = np.cumsum(arrays['sizes'])[:-1]
+        functions = tuple(map(RationalMatrix, *(
+            np.split(arrays[name], ends) for name in ('support', 'values', 'weights'))))
+        half = len(arrays['edges']) - 1
+        return cls(arrays['edges'], functions[:half], functions[half:],
+                   float(arrays['measured_error']), int(arrays['solves']), int(arrays['nodes']))
 
 
 def entry_scale(values: ComplexArray) -> FloatArray:

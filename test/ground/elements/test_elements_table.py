@@ -100,30 +100,6 @@ def test_a_table_is_saved_and_rebuilt_exactly(tables, tmp_path):
         np.testing.assert_array_equal(rebuilt.to_arrays()[name], value)
 
 
-@pytest.mark.parametrize('name, value, message', [
-    ('support', None, "not a table .* 'support'"),
-    ('weights', np.ones(3), r'not a table .*\(3,\) weights'),
-    ('values', np.ones((2, 2)), r'not a table .*\(2, 2\) values'),
-    ('geometry', np.array('sphere'), "geometry must be one of disc, .*got 'sphere'"),
-    ('a0_max', np.array(math.nan), 'a0_max must be > a0_min'),
-])
-def test_a_spoilt_file_is_refused(tables, name, value, message):
-    arrays = tables['disc', 0.1, 0.2].to_arrays()
-    if value is None:
-        del arrays[name]
-    else:
-        arrays[name] = value
-    with pytest.raises(RotorSoilError, match=message):
-        DimensionlessTable.from_arrays(arrays)
-
-
-def test_a_table_with_a_nan_is_refused(tables):
-    arrays = tables['disc', 0.1, 0.2].to_arrays()
-    arrays['weights'] = arrays['weights'] * math.nan
-    with pytest.raises(RotorSoilError, match='not finite'):
-        DimensionlessTable.from_arrays(arrays)
-
-
 @pytest.mark.parametrize('change, message', [
     ({'geometry': 'sphere'}, "geometry must be one of disc, plane_strain, plane_stress, got 'sp"),
     ({'poisson_ratio': 0.495}, r'poisson_ratio must be in \[0, 0\.49\] .*, got 0\.495'),
