@@ -18,6 +18,8 @@ _LARGEST_SHOWN = 64
 # A mapping of more characters than this gets a line for each of its keys.
 _LONGEST_LINE = 96
 
+SHIPPED = Path(__file__).parents[1] / 'config'
+
 
 class _Loader(yaml.SafeLoader):
     """Safe loader with the scalars of YAML 1.2: 1e9 is a number, `on` and 1:30 are strings."""
@@ -90,7 +92,10 @@ def read(path: Path) -> dict[str, Any]:
         with path.open('rb') as stream:
             content = stream.read(_LARGEST_BYTES + 1)
     except OSError as error:
-        raise InputError(f'{path}: cannot be read: {error.strerror}') from error
+        cases = ', '.join(sorted(file.stem for file in SHIPPED.glob('*.yaml')))
+        is_name = isinstance(error, FileNotFoundError) and re.fullmatch(r'\w+', str(path))
+        raise InputError(f'{path}: cannot be read: {error.strerror}'
+                         + (f' (shipped cases: {cases})' if is_name else '')) from error
     if len(content) > _LARGEST_BYTES:
         raise InputError(f'{path}: is larger than {_LARGEST_BYTES // 1024} KiB: no case file')
     try:
@@ -111,8 +116,15 @@ def chosen(path: Path) -> tuple[Path, tuple[str, ...]]:
     """
     file, mark, source = str(path).rpartition('#')
     if not mark or path.exists():
-        return path, ()
-    return Path(file), (f'source={source}',)
+        return located(path), ()
+    return located(Path(file)), (f'source={source}',)
+
+
+def located(path: Path) -> Path:
+    """Return a file; where no file is called so, the shipped case of that name."""
+    shipped = SHIPPED / f'{path}.yaml'
+    is_name = re.fullmatch(r'\w+', str(path)) and not path.is_file() and shipped.is_file()
+    return shipped if is_name else path.expanduser()
 
 
 def parse(text: str, *, source: str) -> Any:

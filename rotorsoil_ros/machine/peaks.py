@@ -19,8 +19,8 @@ _POINTS = 16
 # A peak stands out when it rises by this factor over the valleys beside it.
 _PROMINENCE = 1.5
 
-# Peaks this much smaller than the largest would clutter a list.
-_NEGLIGIBLE = 1e-3
+# Peaks this much smaller than the largest, or than what else moves there, would clutter a list.
+_NEGLIGIBLE, _BESIDE = 1e-3, 0.1
 
 # Peaks of several channels within this share of the speed are one resonance.
 _SAME_RESONANCE = 0.055
@@ -72,9 +72,19 @@ def channel_peaks(predictor: Predictor, channel: str) -> list[Peak]:
 
 
 def resonances(predictor: Predictor, channels: tuple[str, ...]) -> list[Peak]:
-    """Return, for each speed at which channels of one unit peak, the largest peak there."""
+    """
+    Return, for each speed at which channels of one unit peak, the largest peak there.
+
+    What hardly moves beside the others at its speed is left out: patches of a raft have peaks of
+    their own below a machine that passes them smoothly.
+    """
     largest: list[Peak] = []
     everything = [peak for channel in channels for peak in channel_peaks(predictor, channel)]
+    columns = [predictor.channels.index(channel) for channel in channels]
+    moved = np.abs(predictor.predict(np.array([peak.speed for peak in everything])).displacement)
+    beside = moved[:, columns].max(axis=1, initial=0.0).tolist()
+    everything = [peak for peak, most in zip(everything, beside, strict=True)
+                  if peak.amplitude >= _BESIDE * most]
     for peak in sorted(everything, key=lambda peak: -peak.amplitude):
         if largest and peak.amplitude < _NEGLIGIBLE * largest[0].amplitude:
             break

@@ -23,6 +23,7 @@ from rclpy.parameter import Parameter
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.document import located
 from rotorsoil_ros.case.loading import cases_of
 from rotorsoil_ros.case.plant.together import sources_of
 from rotorsoil_ros.errors import InputError
@@ -33,7 +34,6 @@ from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedSource, USUAL
 Rule: TypeAlias = Callable[[Any], str]
 
 LARGEST_MOMENT = 1e3  # [kg m]
-SHIPPED = Path(__file__).parents[1] / 'config'
 OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
 
 
@@ -280,9 +280,7 @@ class Settings:
         path, mark, source = self.value(f'{machine}.case').partition('#')
         if not path:
             raise InputError(f'parameter {machine}.case: must be the path of a case file')
-        shipped = SHIPPED / f'{path}.yaml'
-        file = shipped if re.fullmatch(r'\w+', path) and shipped.is_file() else (
-            Path(path).expanduser())
+        file = located(Path(path))
         if not mark and file.is_file() and machine in sources_of(file):
             mark, source = '#', machine
         return Path(f'{file}{mark}{source}')

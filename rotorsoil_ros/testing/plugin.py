@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rotorsoil_ros.testing.twin import Twin
 
 PROFILE_START_NS = 1_700_000_000_000_000_000
-SHIPPED_CASES = Path(__file__).parents[1] / 'config'
 
 
 @pytest.fixture(scope='session')
@@ -52,7 +51,7 @@ def rotorsoil_case(tmp_path: Path) -> Callable[..., Path]:
     def write(case: str | Path = 'paper_rotor', *overrides: str) -> Path:
         from rotorsoil_ros.case import config, document
 
-        source = _case_file(case)
+        source = document.located(Path(case))
         content = document.read(source)
         document.override(content, overrides)
         target = tmp_path / source.name
@@ -94,6 +93,7 @@ def rotorsoil_twin(
     `rotorsoil_twin('fan.yaml', machine='fan', parameters={'speed.unit': 'rpm'})`. The node is
     active when it is returned and gone when the test is over.
     """
+    from rotorsoil_ros.case.document import located
     from rotorsoil_ros.testing.twin import Twin
 
     with ExitStack() as stack:
@@ -101,15 +101,9 @@ def rotorsoil_twin(
             case: str | Path = 'paper_rotor', *, machine: str = '',
             parameters: dict[str, Any] | None = None,
         ) -> 'Twin':
-            path = _case_file(case)
+            path = located(Path(case))
             twin = Twin(rotorsoil_graph, machine or path.stem, path,
                         {'cache': str(rotorsoil_cache), **(parameters or {})})
             stack.callback(twin.release)
             return twin
         yield start
-
-
-def _case_file(case: str | Path) -> Path:
-    """Return the file of a case: a path, or the name of one that is shipped."""
-    shipped = SHIPPED_CASES / f'{case}.yaml'
-    return shipped if shipped.is_file() else Path(case)

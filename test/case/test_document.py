@@ -1,8 +1,10 @@
 """YAML as an engineer writes it, and as nobody should."""
 
+from pathlib import Path
+
 import pytest
 
-from rotorsoil_ros.case.document import override, parse, read
+from rotorsoil_ros.case.document import chosen, located, override, parse, read, SHIPPED
 from rotorsoil_ros.errors import InputError
 
 
@@ -75,6 +77,16 @@ def test_missing_file_and_directory_are_refused(tmp_path):
         read(tmp_path / 'nothing.yaml')
     with pytest.raises(InputError, match=r'cannot be read: Is a directory$'):
         read(tmp_path)
+
+
+def test_name_of_a_shipped_case_stands_for_its_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert located(Path('plant_fan')) == SHIPPED / 'plant_fan.yaml'
+    assert chosen(Path('fan_house#fan_2')) == (SHIPPED / 'fan_house.yaml', ('source=fan_2',))
+    (tmp_path / 'plant_fan').write_text('a: 1')  # a file of the user's comes first
+    assert located(Path('plant_fan')) == Path('plant_fan')
+    with pytest.raises(InputError, match=r'^fan: cannot be read: .* \(shipped cases: fan_house, '):
+        read(located(Path('fan')))
 
 
 def test_override_replaces_and_adds_in_order():

@@ -1,6 +1,7 @@
 """Peaks of the tabulated response against those of a fine exact sweep."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -59,9 +60,24 @@ def test_resonances_list_each_once_with_the_channel_that_moves_most(machine):
     assert largest in found
 
 
-def test_resonances_leave_out_what_is_a_thousand_times_smaller(machine, monkeypatch):
-    _, predictor = machine
+class Curves:
+    """Channels that move as they are told, at whatever speed."""
+
+    channels = ('a', 'b')
+
+    def __init__(self, *sizes):
+        self.sizes = sizes
+
+    def predict(self, speed):
+        return SimpleNamespace(displacement=np.tile(self.sizes, (len(speed), 1)))
+
+
+@pytest.mark.parametrize('sizes, kept', [
+    ((0.0, 0.0), [Peak(1.0, 'a', 1.0), Peak(2.0, 'b', 2e-3)]),  # a thousandth of the largest
+    ((1.9e-2, 0.0), [Peak(1.0, 'a', 1.0), Peak(2.0, 'b', 2e-3)]),
+    ((2.1e-2, 0.0), [Peak(1.0, 'a', 1.0)])])  # a tenth of what moves beside it
+def test_resonances_leave_out_what_is_small(monkeypatch, sizes, kept):
     given = {'a': [Peak(1.0, 'a', 1.0)], 'b': [Peak(2.0, 'b', 2e-3), Peak(3.0, 'b', 5e-4)]}
     monkeypatch.setattr('rotorsoil_ros.machine.peaks.channel_peaks',
                         lambda _, channel: given[channel])
-    assert resonances(predictor, ('a', 'b')) == [Peak(1.0, 'a', 1.0), Peak(2.0, 'b', 2e-3)]
+    assert resonances(Curves(*sizes), ('a', 'b')) == kept

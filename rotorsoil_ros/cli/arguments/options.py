@@ -135,7 +135,8 @@ def add_verb(
                           help='neither warnings nor progress, only results and errors')
     how_loud.add_argument('-v', '--verbose', action='store_true', help='say what is being done')
     if case:
-        verb.add_argument('case', metavar='CASE', type=Path, help='case file (YAML)')
+        verb.add_argument('case', metavar='CASE', type=Path,
+                          help='case file (YAML), or the name of a shipped case')
         verb.add_argument('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append',
                           default=[], help='override the case file, as in '
                                            'foundations.0.mass=420; may be repeated')
