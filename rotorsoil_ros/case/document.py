@@ -26,18 +26,25 @@ class _Loader(yaml.SafeLoader):
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - so declared by PyYAML
 
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.wrong = set[tuple[int, str]]()  # lines and what is the matter
+
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """Construct a mapping, refusing a key that is no word or stands there twice."""
-        seen = set()
-        for key, _ in node.value:
+        """Construct a mapping without a key that is no word or stands there twice; note it."""
+        seen, good = set(), []
+        for key, value in node.value:
             problem = None
             if not isinstance(key, yaml.ScalarNode):
                 problem = 'a key must be a word'
             elif key.value in seen:
                 problem = f'the key {key.value} stands here twice'
+            else:
+                seen.add(key.value)
+                good.append((key, value))
             if problem is not None:
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-            seen.add(key.value)
+                self.wrong.add((key.start_mark.line + 1, problem))
+        node.value = good
         return super().construct_mapping(node, deep=deep)
 
     def construct_number(self, node: yaml.ScalarNode) -> int | float:
@@ -128,12 +135,17 @@ def located(path: Path) -> Path:
 
 
 def parse(text: str, *, source: str) -> Any:
-    """Return what a YAML text says; an InputError names the source and the line."""
+    """Return what a YAML text says; an InputError names the source and each line at fault."""
     try:
         _refuse_excess(text)
-        return _tree(yaml.load(text, _Loader))
+        loader = _Loader(text)
+        content = _tree(loader.get_single_data())
     except yaml.YAMLError as error:
         raise InputError(f'{source}: {_one_line(error)}') from error
+    if loader.wrong:
+        raise InputError('\n'.join(f'{source}: line {line}: {problem}'
+                                   for line, problem in sorted(loader.wrong)))
+    return content
 
 
 def _tree(value: Any) -> Any:

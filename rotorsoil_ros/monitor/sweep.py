@@ -165,7 +165,6 @@ class Sweeps:
         self._number = 0
         self._over: list[PeakPair] = []
         self._current: list[PeakPair] = []
-        self._released_ns = -1
         self.lobes: dict[Channel, list[float]] = {}
         self.faults: list[str] = []
 

@@ -19,6 +19,14 @@ def test_scalars_are_those_of_yaml_1_2(text, value):
     assert type(got) is type(value)
 
 
+def test_every_key_at_fault_is_told():
+    with pytest.raises(InputError) as caught:
+        parse('a: {b: 1, b: 2}\nc: 1\n[d]: 0\nc: 2', source='x')
+    assert str(caught.value).splitlines() == [
+        'x: line 1: the key b stands here twice', 'x: line 3: a key must be a word',
+        'x: line 4: the key c stands here twice']
+
+
 def test_anchors_and_merges_work():
     got = parse('a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n', source='x')
     assert got == {'a': {'x': 1, 'y': 2}, 'b': {'x': 1, 'y': 3}}
