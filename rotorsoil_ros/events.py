@@ -1,7 +1,7 @@
 """What can happen to a machine, in frozen words that every sink understands."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from enum import IntEnum, StrEnum
 from typing import Any, TypeAlias
 
@@ -186,6 +186,27 @@ class Demodulated:
     deviation: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Beside:
+    """
+    What the machines on the same blocks do to n measured vectors of one of them.
+
+    Attributes
+    ----------
+    slack : (n, channels) float array
+        By how much they may have moved an amplitude, less what could be told apart and was
+        taken out [m, rad].
+    measured, predicted : (n, channels, machines) float array
+        How fast each of them moves the channel, as far as it could be told apart and else as
+        predicted; and as predicted. NaN where its speed is not known [m/s, rad/s rms].
+
+    """
+
+    slack: FloatArray
+    measured: FloatArray
+    predicted: FloatArray
+
+
 @dataclass(frozen=True, slots=True)
 class Compared:
     """
@@ -209,6 +230,8 @@ class Compared:
         Band of the predicted amplitude, NaN where none is known.
     behind, ahead : (n, channels) float array
         Band of the predicted phase about that of the prediction [rad], likewise.
+    beside : Beside or None
+        What machines beside it do, by which the bands are wider; None of one that is alone.
 
     """
 
@@ -224,12 +247,53 @@ class Compared:
     high: FloatArray
     behind: FloatArray
     ahead: FloatArray
+    beside: Beside | None = None
 
     @property
     def residual(self) -> FloatArray:
-        """Amplitude of measured minus predicted, (n, channels) [m, rad]."""
+        """
+        Amplitude of measured minus predicted, (n, channels) [m, rad].
+
+        Beyond what machines beside it may have done: that is no residual of this one.
+        """
         measured = self.amplitude * np.exp(1j * self.phase)
-        return np.asarray(np.abs(measured - self.predicted))
+        apart = np.asarray(np.abs(measured - self.predicted))
+        return apart if self.beside is None else np.maximum(apart - self.beside.slack, 0.0)
+
+    def rows(self, which: npt.NDArray[Any]) -> 'Compared':
+        """Return some of the points."""
+        return self._made(lambda part: part[which], self.channels)
+
+    def columns(self, which: Sequence[int]) -> 'Compared':
+        """Return some of the channels."""
+        if len(which) == len(self.channels):
+            return self
+        return self._made(lambda part: part[:, which] if part.ndim > 1 else part,
+                          tuple(self.channels[column] for column in which))
+
+    @classmethod
+    def joined(cls, events: Iterable['Compared']) -> list['Compared']:
+        """Return what was compared, once for each set of channels."""
+        by_channels: dict[tuple[Channel, ...], list[Compared]] = {}
+        for event in events:
+            by_channels.setdefault(event.channels, []).append(event)
+        return [found[0]._made(lambda *parts: np.concatenate(parts), channels, *found[1:])
+                if len(found) > 1 else found[0] for channels, found in by_channels.items()]
+
+    def _made(
+        self, make: Callable[..., npt.NDArray[Any]], channels: tuple[Channel, ...],
+        *others: 'Compared',
+    ) -> 'Compared':
+        """Return an event with arrays that are made of those of this one and of others."""
+        beside = None if self.beside is None else Beside(*(
+            make(*(getattr(each.beside, name) for each in (self, *others)))
+            for name in Beside.__slots__))
+        return Compared(machine=self.machine, channels=channels, beside=beside, **{
+            name: make(*(getattr(each, name) for each in (self, *others))) for name in _ARRAYS})
+
+
+_ARRAYS = tuple(entry.name for entry in fields(Compared)
+                if entry.name not in ('machine', 'channels', 'beside'))
 
 
 class Reason(StrEnum):
@@ -242,6 +306,7 @@ class Reason(StrEnum):
     NO_PREDICTION = 'channel or speed has no prediction'
     SLOW_ROLL = 'slow roll, taken as runout'
     BELOW_NOISE = 'below noise'
+    BESIDE = 'held against a band that the part of machines beside it widens'
     NOT_QUASI_STATIC = 'not quasi-static'
     STILL_RINGS = 'may ring from before the beginning'
 

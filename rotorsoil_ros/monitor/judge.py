@@ -1,15 +1,13 @@
 """Does the machine behave as predicted? Measured vectors against the answers, while it runs."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
-from difflib import get_close_matches
+from collections.abc import Iterable, Iterator, Mapping
 import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import ACROSS, Channel
 from rotorsoil_ros.events import (
@@ -25,7 +23,6 @@ from rotorsoil_ros.events import (
     Samples,
     Weighed,
 )
-from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.machine.transient.state import Transient
 from rotorsoil_ros.monitor.criteria import Criteria
@@ -35,15 +32,14 @@ from rotorsoil_ros.monitor.rules import Judging
 from rotorsoil_ros.monitor.suspicion import Suspicion
 from rotorsoil_ros.monitor.sweep import Sweeps
 from rotorsoil_ros.monitor.vectors.axes import in_si
+from rotorsoil_ros.monitor.vectors.comparing import Comparer
 from rotorsoil_ros.monitor.vectors.demodulation import Demodulator
 from rotorsoil_ros.monitor.vectors.history import History
-from rotorsoil_ros.monitor.vectors.pairing import Pairing, Runout, Vectors
 from rotorsoil_ros.monitor.vectors.refusal import Refusals
 from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE
 from rotorsoil_ros.monitor.verdict import Account, Teller
 from rotorsoil_ros.monitor.zones import Zones
 
-MOST_NAMES = 16
 REPEAT_NS = NANOSECONDS  # after which a band is told again although the speed has not moved
 MOVED = 1e-3  # share of a speed
 SILENT_TICKS = 2  # without a new speed, after which nothing more is waited for
@@ -65,12 +61,10 @@ class Judge:
         self.machine = machine
         self.history = History()
         self._judging = judging
-        self._predictor, self._transient = predictor, transient
-        self._envelope: Envelope | None = None
-        self._pairing = Pairing(self.history, tolerance_s=judging.rules.matching.tolerance)
-        self.runout = Runout(judging.rules.matching.slow_roll_speed, hindsight)
+        self._comparer = Comparer(machine, self.history, predictor, transient,
+                                  matching=judging.rules.matching, hindsight=hindsight)
+        self.runout = self._comparer.runout
         self._demodulators: dict[Channel, Demodulator] = {}
-        self._paired: set[Channel] = set()
         self._fresh: list[Compared] = []
         self._heard: list[Compared] = []
         self._silent_ticks = 0
@@ -83,19 +77,18 @@ class Judge:
         self.account = Account(judging.rules, self._band, self._zones, self._sweeps,
                                self._suspicion, of_case=list(unstable(predictor.table.stability)))
         self._teller = Teller(machine, self.account)
-        self._unknown: set[Channel] = set()
-        self._told: set[Channel] = set()
         self._band_ns = round(judging.band_period_s * NANOSECONDS)
         self._band_told = -REPEAT_NS, 0.0
         self.is_synthetic = False
 
     def take_predictor(self, predictor: Predictor, transient: Transient) -> None:
         """Judge by another unbalance or table, for which the band is not known yet."""
-        self._predictor, self._transient, self._envelope = predictor, transient, None
+        comparer = self._comparer
+        comparer.predictor, comparer.transient, comparer.envelope = predictor, transient, None
 
     def take_criteria(self, criteria: Criteria) -> None:
         """Judge by a band, resonances and natural speeds from now on."""
-        self._envelope = criteria.envelope
+        self._comparer.envelope = criteria.envelope
         self._zones.natural = {axis: criteria.lowest_natural_speed(axis) for axis in ACROSS}
         self._sweeps.resonances = criteria.resonances
         self._sweeps.are_followed = self._is_followed
@@ -106,24 +99,24 @@ class Judge:
     def on_speed(self, stamp_ns: IntArray, speed: FloatArray, angle: FloatArray) -> bool:
         """Note speeds [rad/s] and rotor angles [rad]; return whether `follow` has something."""
         self.history.add(stamp_ns, speed, angle)
-        return (len(speed) > 1 or not self._pairing.is_idle
-                or (self._envelope is not None
+        return (len(speed) > 1 or not self._comparer.pairing.is_idle
+                or (self._comparer.envelope is not None
                     and self._is_band_due(int(stamp_ns[0]), float(speed[0]))))
 
     def follow(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[Event]:
         """Yield the band of these speeds, and the comparisons that waited for them."""
-        if self._envelope is not None:
+        if self._comparer.envelope is not None:
             rows = list(self._band_rows(stamp_ns, speed))
             if rows:
-                steady, moved = self._answers(stamp_ns[rows], speed[rows])
-                band = self._envelope.at(speed[rows]).around(steady).opened(steady, moved)
+                answers = self._comparer.answers(stamp_ns[rows], speed[rows])
+                band = self._comparer.band(speed[rows], *answers)
+                assert band is not None
                 yield Band(self.machine, stamp_ns[rows], speed[rows], band.low, band.high)
         yield from self._matched()
 
     def on_measured(self, measured: Measured) -> Iterator[Event]:
         """Yield the comparisons that a measurement completes."""
-        self._paired |= set(measured.channels)
-        self._pairing.take(measured)
+        self._comparer.take(measured)
         yield from self._matched()
 
     def in_si(self, samples: Samples) -> Samples:
@@ -150,14 +143,13 @@ class Judge:
         for demodulator in self._demodulators.values():
             for found in demodulator.vectors():
                 yield found
-                if found.channel not in self._paired:  # vectors are told besides: they count
-                    self._pairing.take_demodulated(found)
+                self._comparer.take_demodulated(found)
         yield from self._refused(now_ns)
-        self._pairing.tick()
+        self._comparer.pairing.tick()
         yield from self._matched(is_tick=True)
         heard, self._heard = self._heard, []
         yield from self._settle(now_ns)
-        yield from self._strangers(now_ns)
+        yield from self._comparer.strangers(now_ns)
         yield from self._teller.tell(
             now_ns, stale_after_s=stale_after_s, has_data=bool(heard),
             has_phase=any(np.isfinite(each.phase).any() for each in heard),
@@ -194,10 +186,11 @@ class Judge:
         self._zones.close(now_ns)
         now = self.history.last_speed
         if math.isfinite(now):
-            row = self._answers(np.array([self.history.last_ns]), np.array([now]))[1][0]
+            row = self._comparer.answers(
+                np.array([self.history.last_ns]), np.array([now]))[1][0]
             self._zones.predict(
                 {name: now * abs(row[column]) / math.sqrt(2.0)
-                 for column, name in enumerate(self._predictor.channels)
+                 for column, name in enumerate(self._comparer.predictor.channels)
                  if name.is_housing and abs(row[column]) > 0.0}, now)
 
     def _counted(self, events: Iterable[Event]) -> Iterator[Event]:
@@ -209,20 +202,20 @@ class Judge:
 
     def _dated(self, pace: Pace, settled_ns: float) -> Iterator[Weighed]:
         """Yield the points up to a stamp with their rate of speed and why they do not count."""
-        waiting, self._fresh = _joined(self._fresh), []
+        waiting, self._fresh = Compared.joined(self._fresh), []
         for compared in waiting:
             known = compared.stamp_ns <= settled_ns
             if not known.all():
-                self._fresh.append(_rows(compared, ~known))
+                self._fresh.append(compared.rows(~known))
             if known.any():
-                dated = _rows(compared, known)
+                dated = compared.rows(known)
                 rate, lag = pace.at(dated.stamp_ns)
                 yield Weighed(dated, rate, self._reasons(dated, lag))
 
     def _reasons(self, compared: Compared, lag: FloatArray) -> npt.NDArray[Any]:
         """Return why points may not be held against the machine, (n, channels)."""
         rules = self._judging.rules
-        lowest, highest = self._predictor.table.speed_range
+        lowest, highest = self._comparer.predictor.table.speed_range
         speed = compared.speed[:, None]
         floor = np.maximum(rules.matching.noise, ABOVE_NOISE * np.maximum(
             compared.deviation, [self.runout.scatter(name) for name in compared.channels]))
@@ -259,73 +252,21 @@ class Judge:
 
     def _matched(self, *, is_tick: bool = False) -> Iterator[Compared]:
         """Yield what has found its speed and has a prediction."""
-        by_channels: dict[tuple[Channel, ...], list[Vectors]] = {}
-        for vectors in self._pairing.ready(is_tick=is_tick):
-            by_channels.setdefault(vectors.channels, []).append(vectors)
-        for channels, found in by_channels.items():
-            compared = self._compare(channels, found)
+        for compared in self._comparer.compared(is_tick=is_tick):
             self._fresh.append(compared)
-            known = [column for column, name in enumerate(compared.channels)
-                     if name in self._predictor.channels]
-            told = np.isfinite(compared.speed)
-            if known and told.any():
-                matched = _columns(compared if told.all() else _rows(compared, told), known)
+            matched = self._comparer.predicted(compared)
+            if matched is not None:
                 self._heard.append(matched)
                 yield matched
 
-    def _compare(self, channels: Sequence[Channel], found: Sequence[Vectors]) -> Compared:
-        """Return vectors of the same channels beside their prediction, NaN where there is none."""
-        names = tuple(channels)
-        self._unknown |= set(names).difference(self._predictor.channels)
-        speed = np.array([vectors.speed for vectors in found])
-        amplitude, phase = (np.array(part) for part in zip(
-            *(vectors.displacement() for vectors in found), strict=True))
-        amplitude, phase = self.runout.subtract(names, speed, amplitude, phase)
-        columns = [self._predictor.channels.index(name) if name in self._predictor.channels
-                   else -1 for name in names]
-        unknown = np.array(columns) < 0
-        stamps = np.array([vectors.stamp_ns for vectors in found])
-        steady, moved = self._answers(stamps, speed)
-        predicted = moved[:, columns]
-        predicted[:, unknown] = complex(math.nan, math.nan)
-        bounds = [np.full(amplitude.shape, np.nan)] * 4
-        if self._envelope is not None:
-            band = self._envelope.at(speed).around(steady).opened(steady, moved)
-            bounds = [np.where(unknown, np.nan, part[:, columns])
-                      for part in (band.low, band.high, band.behind, band.ahead)]
-        return Compared(
-            self.machine, stamps, speed, names, amplitude, phase,
-            np.array([vectors.deviation for vectors in found]), predicted, *bounds)
-
-    def _answers(
-        self, stamp_ns: IntArray, speed: FloatArray,
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Return displacements without and with what changes of the speed have struck, (n, c)."""
-        steady = self._predictor.answer(speed)
-        moved = self._predictor.moved(steady, [
-            self._transient.at(stamp, told) if math.isfinite(told) else None
-            for stamp, told in zip(stamp_ns.tolist(), speed.tolist(), strict=True)])
-        return steady.displacement, moved.displacement
-
     def _unsettled(self) -> Unsettled | None:
         """Return who tells what the answer leaves out; None of an answer that is steady."""
-        return Unsettled(lambda: self._transient) if self._is_followed else None
+        return Unsettled(lambda: self._comparer.transient) if self._is_followed else None
 
     @property
     def _is_followed(self) -> bool:
         """Whether the answers follow changes of the speed."""
-        return len(self._transient.poles) > 0
-
-    def _strangers(self, now_ns: int) -> Iterator[Remark]:
-        """Tell once which measured channels no prediction has: a slip in a name, mostly."""
-        new = sorted(self._unknown - self._told)[:MOST_NAMES]
-        self._unknown = set()
-        if new and len(self._told) < MOST_NAMES:
-            self._told |= set(new)
-            near = [get_close_matches(name, self._predictor.channels, n=1) for name in new]
-            yield Remark(self.machine, now_ns, Level.WARN, 'measured but not predicted: '
-                         + ', '.join(name + (f' (did you mean {like[0]}?)' if like else '')
-                                     for name, like in zip(new, near, strict=True)))
+        return len(self._comparer.transient.poles) > 0
 
     def _refused(self, now_ns: int) -> Iterator[Remark]:
         """Tell when raw samples of a channel begin or cease to be refused, and why."""
@@ -342,43 +283,13 @@ class Judge:
     @property
     def told_twice(self) -> set[Channel]:
         """Channels of which both vectors and raw samples came; the vectors count."""
-        return self._paired & set(self._demodulators)
+        return self._comparer.paired & set(self._demodulators)
 
     def _counts(self) -> dict[str, float | str]:
         found: dict[str, float | str] = {
-            'without_speed': self._pairing.given_up,
+            'without_speed': self._comparer.pairing.given_up,
             'samples_left_out': sum(each.left_out for each in self._demodulators.values()),
             'raw_channels': len(self._demodulators)}
         for channel, refusals in self.refusals.items():
             found |= {f'{channel}_{key}': value for key, value in refusals.values().items()}
         return found
-
-
-_ARRAYS = tuple(entry.name for entry in fields(Compared)
-                if entry.name not in ('machine', 'channels'))
-
-
-def _rows(compared: Compared, which: npt.NDArray[Any]) -> Compared:
-    """Return some of the points."""
-    return Compared(machine=compared.machine, channels=compared.channels, **{
-        name: getattr(compared, name)[which] for name in _ARRAYS})
-
-
-def _columns(compared: Compared, which: Sequence[int]) -> Compared:
-    """Return some of the channels."""
-    if len(which) == len(compared.channels):
-        return compared
-    return Compared(
-        machine=compared.machine, channels=tuple(compared.channels[column] for column in which),
-        **{name: part[:, which] if (part := getattr(compared, name)).ndim > 1 else part
-           for name in _ARRAYS})
-
-
-def _joined(found: Sequence[Compared]) -> list[Compared]:
-    """Return what was compared, once for each set of channels."""
-    by_channels: dict[tuple[Channel, ...], list[Compared]] = {}
-    for each in found:
-        by_channels.setdefault(each.channels, []).append(each)
-    return [Compared(machine=parts[0].machine, channels=channels, **{
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS})
-        for channels, parts in by_channels.items()]

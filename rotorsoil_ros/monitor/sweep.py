@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Compared, Event, Level, NANOSECONDS, Reason, Remark, Weighed
+from rotorsoil_ros.events import Event, Level, NANOSECONDS, Reason, Remark, Weighed
 from rotorsoil_ros.monitor.passage import (
     Allowed,
     is_decided,
@@ -320,10 +320,7 @@ def resonances_of(peaks: Sequence[PeakPair]) -> list[Resonance]:
 
 
 def _part(weighed: Weighed, rows: npt.NDArray[Any]) -> Weighed:
-    compared = weighed.compared
-    own = {entry.name: getattr(compared, entry.name)[rows] for entry in fields(Compared)
-           if entry.name not in ('machine', 'channels')}
-    return Weighed(replace(compared, **own), weighed.rate[rows], weighed.reason[rows])
+    return Weighed(weighed.compared.rows(rows), weighed.rate[rows], weighed.reason[rows])
 
 
 def _led_astray(block: Sequence[Weighed], lag: Lag, largest: float) -> Iterator[Weighed]:

@@ -11,7 +11,6 @@ import rerun as rr
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import (
     Band,
     Compared,
@@ -206,7 +205,7 @@ class MachineView:
             self._send_predicted(self._predicted)
         if self._compared:
             self._orbits.compare(self._compared)
-            for joined in _joined(self._compared):
+            for joined in Compared.joined(self._compared):
                 self._trends.compared(joined)
                 self._bode.compare(joined)
         if self._bands:
@@ -268,16 +267,3 @@ class MachineView:
 def _clock(stamp_ns: int) -> str:
     """Return the time of day (UTC): the viewer's own column is too narrow for it."""
     return str(np.datetime64(stamp_ns, 'ns')).partition('T')[2][:8]
-
-
-def _joined(events: Iterable[Compared]) -> Iterable[Compared]:
-    """Join what was measured of the same channels: one column is cheaper than many rows."""
-    by_channels: dict[tuple[Channel, ...], list[Compared]] = {}
-    for event in events:
-        by_channels.setdefault(event.channels, []).append(event)
-    for channels, found in by_channels.items():
-        def all_of(name: str, found: list[Compared] = found) -> np.ndarray:
-            return np.concatenate([getattr(event, name) for event in found])
-        yield Compared(found[0].machine, all_of('stamp_ns'), all_of('speed'), channels, *(
-            all_of(name) for name in ('amplitude', 'phase', 'deviation', 'predicted', 'low',
-                                      'high', 'behind', 'ahead')))
