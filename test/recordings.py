@@ -44,3 +44,33 @@ def predicted(machine, speeds, start=START, period=PERIOD):
     prediction = predictor.predict(np.where(known, speed, 300.0))
     prediction.parts[~known] = np.nan
     return Predicted('fan', start + period * np.arange(len(speed)), prediction)
+
+
+class Paper:
+    """A recording that keeps what is drawn as plain numbers."""
+
+    def __init__(self):
+        self.drawn = {}
+        self.stamps = {}
+
+    def still(self, entity, what):
+        for batch in what.as_component_batches():
+            self.drawn[entity, str(batch.component_descriptor().component)] = (
+                batch.as_arrow_array().to_pylist())
+
+    def send(self, entity, stamp_ns, columns):
+        self.stamps[entity] = stamp_ns.tolist()
+        for each in columns:
+            self.drawn[entity, str(each.component_descriptor().component)] = (
+                each.as_arrow_array().to_pylist())
+
+    def strips(self, entity, stamp_ns, strips):
+        self.stamps[entity] = stamp_ns.tolist()
+        self.drawn[entity, 'strips'] = strips
+
+    def series(self, entity, stamp_ns, values, **_):
+        self.stamps[entity] = stamp_ns.tolist()
+        self.drawn[entity, 'values'] = values.tolist()
+
+    def begins(self, _, stamp_ns, __):
+        return np.arange(len(stamp_ns))

@@ -45,6 +45,15 @@ class Placement:
         return (self.x - math.sin(self.heading) * position,
                 self.y + math.cos(self.heading) * position)
 
+    @property
+    def axes(self) -> FloatArray:
+        """Directions of its own x, along and z in the axes of the ground, (3, 3)."""
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        x, flat, up = (cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)
+        if self.is_upright:
+            return np.array([x, up, (sine, -cosine, 0.0)])
+        return np.array([x, flat, up])
+
     def seat_rows(
         self, *, position: float, height: float, centre: tuple[float, float],
     ) -> FloatArray:

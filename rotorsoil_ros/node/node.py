@@ -29,12 +29,13 @@ from rclpy.task import Future
 from rotorsoil_ros.case import cache
 from rotorsoil_ros.case.loading import load_all
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.plant.together import plants_of
 from rotorsoil_ros.errors import BAD_INPUT, InputError, RotorSoilError
 from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
 from rotorsoil_ros.node.parameters import described, Settings
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
-from rotorsoil_ros.node.together import Together, together_of
+from rotorsoil_ros.node.together import Together
 from rotorsoil_ros.stop import Stop
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
@@ -150,7 +151,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         held.callback(self.destroy_lifecycle_publisher, diagnostics)
         self._together = [Together(self, plant, names, machines[names[0]].table.channels, log=log,
                                    diagnostics=diagnostics)
-                          for plant, names in together_of(machines)]
+                          for plant, names in plants_of(machines)]
         for together in self._together:
             held.callback(together.destroy)
         for name, machine in machines.items():

@@ -11,7 +11,6 @@ from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import Shaken
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Diagnostics, Event, Level, Predicted
@@ -103,18 +102,6 @@ class Together:
     ) -> None:
         publisher.publish(payload)
         self._log.write(Records(publisher.topic_name, kind, [stamp_ns], [payload]))
-
-
-def together_of(machines: Mapping[str, Machine]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield every plant of which several machines are answered, with their names."""
-    plants: dict[tuple[object, ...], list[str]] = {}
-    for name, machine in machines.items():
-        berth = machine.case.berth
-        if berth is not None:
-            plants.setdefault((berth.plant, machine.table.channels), []).append(name)
-    for (plant, _), names in plants.items():
-        if len(names) > 1:
-            yield str(plant), tuple(names)
 
 
 def geared(source: SpeedSource, case: Case) -> SpeedSource:

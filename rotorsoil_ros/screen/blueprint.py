@@ -15,11 +15,13 @@ from rotorsoil_ros.screen.channels import (
     HOUSINGS,
     JOURNALS,
     moving_housings,
+    NEIGHBOURS,
     PROBES,
     ROCKING,
     Trend,
 )
 from rotorsoil_ros.screen.orbits import Orbits
+from rotorsoil_ros.screen.plant import ShownPlant
 from rotorsoil_ros.screen.recording import TIMELINE
 from rotorsoil_ros.screen.scene import Scene
 from rotorsoil_ros.screen.trends import ZoneLane
@@ -27,10 +29,10 @@ from rotorsoil_ros.screen.waterfall import Waterfall
 
 # What is measured most often comes first: its tab is the one that is open. Amplitudes of
 # housings are shown as velocities already.
-ORDER = (PROBES, HOUSINGS, DISCS, JOURNALS, BLOCK, ROCKING)
-ORDER_OF_AMPLITUDES = (PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING)
+ORDER = (PROBES, HOUSINGS, DISCS, JOURNALS, BLOCK, ROCKING, NEIGHBOURS)
+ORDER_OF_AMPLITUDES = (PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING, NEIGHBOURS)
 DIRECTIONS = {'x': 'horizontal', 'z': 'vertical'}
-FROM = (1.15, -0.72, 0.58)  # where the eye is, in extents of the machine
+FROM = (0.92, -0.58, 0.46)  # where the eye is, in diagonals of the scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +66,10 @@ class Shown:
         return [trend for trend in self.trends if trend.kind == kind]
 
 
-def blueprint(machines: Mapping[str, Shown]) -> rrb.Blueprint:
-    """Return one tab per machine: trends on the left, pictures, zones and events on the right."""
-    tabs = [rrb.Horizontal(_trend_column(shown), _picture_column(shown),
+def blueprint(machines: Mapping[str, Shown], plants: Sequence[ShownPlant] = ()) -> rrb.Blueprint:
+    """Return one tab per plant, and per machine: trends left, pictures, zones, events right."""
+    tabs = [_plant(plant, machines) for plant in plants]
+    tabs += [rrb.Horizontal(_trend_column(shown), _picture_column(shown),
                            column_shares=[1.0, 1.0], name=name)
             for name, shown in machines.items()]
     return rrb.Blueprint(
@@ -91,7 +94,8 @@ def _trend_column(shown: Shown) -> rrb.Vertical:
 def _velocity(shown: Shown, axis: str) -> rrb.View:
     contents = [f'{trend.entity}/velocity/**' for trend in shown.housings
                 if trend.channel.axis == axis]
-    return _series(f'Housings {DIRECTIONS[axis]}, velocity [mm/s rms]',
+    direction = f'along {axis}' if shown.case.rotor.is_upright else DIRECTIONS[axis]
+    return _series(f'Housings {direction}, velocity [mm/s rms]',
                    [*contents, f'{shown.entity("limits", axis)}/**'])
 
 
@@ -137,17 +141,31 @@ def _picture_column(shown: Shown) -> rrb.Vertical:
     return rrb.Vertical(*rows, events, row_shares=[*shares, 1.4])
 
 
+def _plant(plant: ShownPlant, machines: Mapping[str, Shown]) -> rrb.Horizontal:
+    speeds = [machines[name].entity('speed') for name in plant.names]
+    charts = rrb.Vertical(
+        _series('Speeds [rpm]', speeds),
+        _series('Housings, velocity of all together [mm/s rms]', [f'{plant.entity("total")}/**']),
+        row_shares=[1.0, 2.0])
+    return rrb.Horizontal(charts, _picture(
+        f'{plant.plant}: all machines', plant.scene, plant.entity('picture'),
+        plant.entity('caption')), column_shares=[1.0, 1.6], name=plant.plant)
+
+
 def _machine(shown: Shown) -> rrb.Vertical:
-    scene, picture = shown.scene, shown.entity('picture')
-    target = np.array([0.0, 0.5 * scene.length, 0.36 * scene.shaft_height])
+    return _picture(f'{shown.name}: rotor on its foundation', shown.scene,
+                    shown.entity('picture'), shown.entity('caption'))
+
+
+def _picture(name: str, scene: Scene, picture: str, caption: str) -> rrb.Vertical:
+    target = np.array([*(0.5 * (scene.low + scene.high))[:2], 0.4 * scene.high[2]])
     eye = rrb.EyeControls3D(
-        position=target + scene.extent * np.array(FROM), look_target=target,
+        position=target + scene.reach * np.array(FROM), look_target=target,
         eye_up=(0.0, 0.0, 1.0))
     return rrb.Vertical(
         rrb.Spatial3DView(
-            name=f'{shown.name}: rotor on its foundation', origin=picture,
-            contents=f'{picture}/**',
+            name=name, origin=picture, contents=f'{picture}/**',
             line_grid=rrb.LineGrid3D(visible=True, spacing=0.1 * scene.extent),
             eye_controls=eye),
-        rrb.TextDocumentView(name='What is drawn', origin=shown.entity('caption')),
+        rrb.TextDocumentView(name='What is drawn', origin=caption),
         row_shares=[6.0, 0.8], name='Machine')

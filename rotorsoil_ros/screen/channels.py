@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import rerun as rr
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.plant.berth import placed
 from rotorsoil_ros.channel import Channel
 
 MICRO = 1e6  # [um, urad] per [m, rad]
-PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING = (
-    'Probes', 'Discs', 'Journals', 'Housings', 'Block', 'Rocking of the block')
+PROBES, DISCS, JOURNALS, HOUSINGS, BLOCK, ROCKING, NEIGHBOURS = (
+    'Probes', 'Discs', 'Journals', 'Housings', 'Foundation', 'Rocking of the foundation',
+    'Neighbours')
 CHANNEL_COLOURS = ((78, 154, 230), (255, 159, 54), (80, 190, 90), (235, 90, 90), (178, 133, 219),
            (190, 130, 115), (240, 145, 205), (160, 160, 160), (208, 209, 60), (60, 205, 220))
 
@@ -35,6 +37,12 @@ class Trend:
         red, green, blue = (round(0.55 * part) for part in self.colour)
         return red, green, blue
 
+    @property
+    def pale(self) -> tuple[int, int, int]:
+        """Its colour for what stands beside it."""
+        red, green, blue = (round(part + 0.55 * (255 - part)) for part in self.colour)
+        return red, green, blue
+
 
 def moving_housings(case: Case) -> list[str]:
     """Return the bearings whose housings stand on something that gives way."""
@@ -45,7 +53,10 @@ def moving_housings(case: Case) -> list[str]:
 
 def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]:
     """Return how the channels of a case are shown."""
-    owners = {bearing.name: JOURNALS for bearing in case.rotor.bearings}
+    _, *beside = placed(case)
+    owners = {station.name: NEIGHBOURS for _, rotor, _ in beside
+              for stations in (rotor.bearings, rotor.discs, rotor.probes) for station in stations}
+    owners |= {bearing.name: JOURNALS for bearing in case.rotor.bearings}
     owners |= {disc.name: DISCS for disc in case.rotor.discs}
     owners |= {probe.name: PROBES for probe in case.rotor.probes}
     owners |= {probe.name: PROBES for probe in case.ground_probes}
@@ -61,6 +72,8 @@ def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]
 
 
 def _kind(channel: Channel, kind_of_owner: str) -> str:
+    if kind_of_owner == NEIGHBOURS:
+        return NEIGHBOURS
     if channel.is_housing:
         return HOUSINGS
     return ROCKING if channel.is_rotation else kind_of_owner

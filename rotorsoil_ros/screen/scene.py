@@ -1,7 +1,7 @@
-"""What does the machine look like while it vibrates? Its geometry, and how far it bends."""
+"""What do machines look like while they vibrate? Their geometry, and how far they bend."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -9,18 +9,23 @@ from scipy.interpolate import CubicSpline
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.plant.berth import mounts, placed
 from rotorsoil_ros.channel import across, Channel, DOFS, JOURNAL
 from rotorsoil_ros.ground.plan import Part
 from rotorsoil_ros.ground.soil import Circle, extents, parts_of
+from rotorsoil_ros.machine.flexible.lattice import Lattice
 from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.placement import Placement
+from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.disc import Disc
 
 SHAFT_POINTS = 61
 ORBIT_POINTS = 33
-LARGEST_SHARE = 0.15  # of the shaft length, that the largest drawn displacement may take
+LARGEST_SHARE = 0.15  # of the longest shaft, that the largest drawn displacement may take
 SMALLEST_SHARE = 0.05  # below it the scale is chosen anew
 _HOLE = 1.08  # of a block, how wide the hole is drawn that it stands in
 BLOCK_SHARE = 0.45  # of the shaft height, that a block takes whose height is not known
+_TRESTLE = 0.3  # of the height of a shaft above its foot, that its legs stand apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,7 @@ class Station:
 @dataclass(frozen=True, slots=True)
 class Block:
     """
-    A drawn foundation: half-sizes, height, centre and bearing seats [m], its six channels.
+    A drawn foundation: half-sizes, height, centre, legs of its bearings [m], its six channels.
 
     It is schematic where its case does not tell its height. `embedment` is how deep its base lies
     below the surface [m].
@@ -59,12 +64,12 @@ class Block:
     half_width: float
     half_length: float
     height: float
+    centre_x: float
     centre_y: float
-    seats: tuple[float, ...]
+    legs: tuple[FloatArray, ...]
     channels: tuple[int, ...]
     is_schematic: bool
     embedment: float = 0.0
-    centre_x: float = 0.0
     parts: tuple[Part, ...] = ()
 
     @property
@@ -80,17 +85,18 @@ class Block:
                                                                  strict=True))]
 
 
-class Scene:
+class Line:
     """
-    The machine as lines and boxes; y along the shaft, z up, ground at zero.
+    One shaft with its stations, in the axes of the ground.
 
-    Between stations the shaft is drawn as a cubic spline: what an elastic beam does that is
-    loaded at its stations.
+    Between stations it is drawn as a cubic spline: what an elastic beam does that is loaded at
+    its stations.
     """
 
-    def __init__(self, case: Case, channels: Sequence[str]) -> None:
-        index = {name: number for number, name in enumerate(channels)}
-        rotor = case.rotor
+    def __init__(
+        self, name: str, rotor: Rotor, place: Placement, index: Mapping[Channel, int],
+    ) -> None:
+        self.name = name
         places = [(across(bearing.name, JOURNAL), bearing.position, 0.0)
                   for bearing in rotor.bearings]
         places += [(across(disc.name), disc.position, disc_radius(disc)) for disc in rotor.discs]
@@ -100,36 +106,25 @@ class Scene:
         self.stations = sorted(
             (Station(x.station, y, radius, index[x], index[z]) for (x, z), y, radius in places),
             key=lambda station: station.y)
-        self.shaft_height = rotor.shaft_height
-        self.length = sum(section.length for section in rotor.shaft)
-        blocks = {foundation.name for foundation in case.foundations}
-        self.blocks = [
-            replace(_block(foundation, case, index), embedment=embedment.depth)
-            for foundation, embedment in zip(
-                case.foundations if case.berth is None else case.berth.seen(case.foundations),
-                case.embedments, strict=True)]
-        self.ground_seats = tuple(bearing.position for bearing in rotor.bearings
-                                  if bearing.foundation not in blocks)
+        self.start = np.array([place.x, place.y, rotor.shaft_height])
+        self.sideways, self.along, self.upwards = place.axes
+        self.length = rotor.length
         self.y = np.linspace(0.0, self.length, SHAFT_POINTS)
         self._bending = _bending([station.y for station in self.stations], self.y)
+        self._columns = ([station.x_channel for station in self.stations],
+                         [station.z_channel for station in self.stations])
+        self._at = np.array([station.y for station in self.stations])
 
-    @property
-    def extent(self) -> float:
-        """How large the whole is [m]."""
-        blocks = [2.0 * max(block.half_width, block.half_length) for block in self.blocks]
-        return max(self.length, self.shaft_height, *blocks)
+    def offsets(self, motion: FloatArray) -> FloatArray:
+        """Return where channels (n, c) move the stations across the shaft, (n, stations, 2)."""
+        x, z = self._columns
+        return np.stack([motion[:, x], motion[:, z]], axis=2)
 
-    def name_place(self, station: Station) -> tuple[float, float, float]:
-        """Return where the name of a station stands: a disc's above it, others at the foot."""
-        if station.radius > 0.0:
-            return 0.0, station.y, self.shaft_height + station.radius + 0.08 * self.extent
-        return 0.0, station.y, 0.6 * self.shaft_height
-
-    def stations_at(self, displacement: ComplexArray, turn: FloatArray) -> FloatArray:
-        """Return where the stations are at angles of turn (n,): offsets (n, stations, 2)."""
-        x = displacement[:, [station.x_channel for station in self.stations]]
-        z = displacement[:, [station.z_channel for station in self.stations]]
-        return np.real(np.stack([x, z], axis=2) * np.exp(1j * turn)[:, None, None])
+    def points(self, y: FloatArray, offsets: FloatArray) -> FloatArray:
+        """Return points along the shaft at y with offsets (..., 2) across it, (..., 3) [m]."""
+        x, z = offsets[..., 0, None], offsets[..., 1, None]
+        return np.asarray(self.start + np.asarray(y)[..., None] * self.along
+                          + x * self.sideways + z * self.upwards)
 
     def shaft(self, offsets: FloatArray) -> FloatArray:
         """Return the shaft through station offsets (n, stations, 2): points (n, p, 3) [m]."""
@@ -138,28 +133,90 @@ class Scene:
     def orbits(self, displacement: ComplexArray, scale: FloatArray) -> FloatArray:
         """Return the scaled orbits of all stations, (n, stations, points, 3) [m]."""
         turn = np.linspace(0.0, 2.0 * np.pi, ORBIT_POINTS)
-        around = np.stack([self.stations_at(displacement, np.full(len(displacement), angle))
+        around = np.stack([self.offsets(np.real(displacement * np.exp(1j * angle)))
                            for angle in turn], axis=2)
-        y = np.array([station.y for station in self.stations])[:, None]
-        return self.points(y, around * scale[:, None, None, None])
+        return self.points(self._at[:, None], around * scale[:, None, None, None])
 
     def discs(self, offsets: FloatArray) -> FloatArray:
         """Return the rims of the discs at station offsets, (n, discs, points, 3) [m]."""
         turn = np.linspace(0.0, 2.0 * np.pi, ORBIT_POINTS)
         rims = [number for number, station in enumerate(self.stations) if station.radius > 0.0]
         radius = np.array([self.stations[number].radius for number in rims])[:, None, None]
-        y = np.array([self.stations[number].y for number in rims])[:, None]
         circle = np.stack([np.sin(turn), np.cos(turn)], axis=1)
-        return self.points(y, offsets[:, rims, None] + radius * circle)
+        return self.points(self._at[rims][:, None], offsets[:, rims, None] + radius * circle)
 
-    def points(self, y: FloatArray, offsets: FloatArray) -> FloatArray:
-        """Return points along the shaft at y with offsets (..., 2) across it, (..., 3) [m]."""
-        x, z = offsets[..., 0], offsets[..., 1]
-        return np.stack([x, np.broadcast_to(y, x.shape), self.shaft_height + z], axis=-1)
+    def stationed(self, offsets: FloatArray) -> FloatArray:
+        """Return where the stations are at their offsets, (n, stations, 3) [m]."""
+        return self.points(self._at, offsets)
 
-    def largest(self, displacement: ComplexArray) -> FloatArray:
-        """Return how far anything that is drawn moves, (n,) [m]; NaN where it is not known."""
-        size = np.abs(displacement)
+    def named_at(self, station: Station, extent: float) -> FloatArray:
+        """Return where the name of a station stands: a disc's beyond it, others at the foot."""
+        beside = (station.radius + 0.08 * extent if station.radius > 0.0
+                  else -0.2 * extent if self.is_upright else -0.4 * self.start[2])
+        return self.points(np.array(station.y), np.array([0.0, beside]))
+
+    def topped(self, above: float) -> FloatArray:
+        """Return a place so far above all of it [m]."""
+        highest = max(station.radius for station in self.stations)
+        end, reach = (self.length, 0.0) if self.is_upright else (0.5 * self.length, highest)
+        place: FloatArray = self.points(np.array(end), np.zeros(2))
+        return np.asarray(place + (above + reach) * np.eye(3)[2])
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether it stands."""
+        return bool(self.along[2] > 0.0)
+
+
+class Scene:
+    """The machines of a case as lines and boxes; z up, contacts at zero."""
+
+    def __init__(self, case: Case, channels: Sequence[Channel]) -> None:
+        index = {name: number for number, name in enumerate(channels)}
+        self.lines = [Line(name, rotor, place, index) for name, rotor, place in placed(case)]
+        blocks = [(block, embedment.depth) for block, embedment in zip(
+            case.foundations, case.embedments, strict=True)]
+        self.blocks = [_block(block, case, index, depth) for block, depth in blocks
+                       if block.body is None]
+        self.lattices = [Lattice.of(block, mounts(case), channels) for block, _ in blocks
+                         if block.body is not None]
+        names = {block.name for block, _ in blocks}
+        self.legs = [_leg(rotor, place, bearing.position, 0.0) for _, rotor, place in placed(case)
+                     for bearing in rotor.bearings if bearing.foundation not in names]
+        self.longest = max(line.length for line in self.lines)
+        corners = np.concatenate([
+            *(line.points(line.y[[0, -1]], np.zeros((2, 2))) for line in self.lines),
+            *([[block.centre_x + x * block.half_width, block.centre_y + x * block.half_length, 0.0]
+               for x in (-1.0, 1.0)] for block in self.blocks),
+            *(lattice.places for lattice in self.lattices)])
+        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+
+    @property
+    def extent(self) -> float:
+        """How large the whole is [m]."""
+        return float(max(self.high[2], *(self.high - self.low)))
+
+    @property
+    def reach(self) -> float:
+        """From one end of everything to the other [m]."""
+        return float(np.linalg.norm(np.maximum(self.high, 0.0) - self.low))
+
+    @property
+    def names(self) -> list[tuple[str, FloatArray]]:
+        """Words and where they stand: of one machine its stations, else the machines."""
+        if len(self.lines) == 1:
+            [line] = self.lines
+            return [(station.name, line.named_at(station, self.extent))
+                    for station in line.stations]
+        return [(line.name, line.topped(0.08 * self.extent)) for line in self.lines]
+
+    @property
+    def stations(self) -> list[Station]:
+        """Those of all shafts."""
+        return [station for line in self.lines for station in line.stations]
+
+    def largest(self, size: FloatArray) -> FloatArray:
+        """Return how far anything drawn moves at amplitudes (n, c), (n,) [m]; NaN: not known."""
         moves: list[FloatArray] = [
             size[:, [station.x_channel, station.z_channel]].max(axis=1)
             for station in self.stations]
@@ -167,6 +224,8 @@ class Scene:
             arm = max(block.half_length, block.half_width, block.height)
             moves += [size[:, list(block.channels[:3])].max(axis=1),
                       arm * size[:, list(block.channels[3:])].max(axis=1)]
+        moves += [(size @ np.abs(lattice.follow).max(axis=1).T).max(axis=1)
+                  for lattice in self.lattices]
         largest: FloatArray = np.maximum.reduce(moves)
         return largest
 
@@ -178,9 +237,9 @@ class Scene:
         """
         scales = np.empty(len(largest))
         for number, size in enumerate(largest):
-            share = size * last / self.length
+            share = size * last / self.longest
             if size > 0.0 and not SMALLEST_SHARE <= share <= LARGEST_SHARE:
-                last = round_scale(LARGEST_SHARE * self.length / size)
+                last = round_scale(LARGEST_SHARE * self.longest / size)
             scales[number] = last
         return scales
 
@@ -196,16 +255,28 @@ def round_scale(wanted: float) -> float:
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step <= wanted / decade * 1.001))
 
 
-def _block(foundation: Foundation, case: Case, index: Mapping[str, int]) -> Block:
+def _leg(rotor: Rotor, place: Placement, position: float, foot: float) -> FloatArray:
+    """Return the trestle of a bearing, from its foot up to the shaft, (3, 3) [m]."""
+    x, y = place.point(position)
+    top = rotor.shaft_height + position * place.axes[1, 2]
+    apart = _TRESTLE * max(top - foot, 0.0)
+    return np.array([[x, y, foot], [x, y, top], [x, y, foot]]) + np.outer(
+        [-apart, 0.0, apart], place.axes[0])
+
+
+def _block(
+    foundation: Foundation, case: Case, index: Mapping[Channel, int], depth: float,
+) -> Block:
     width, length = (0.5 * (last - first) for first, last in extents(foundation.contact))
-    seats = tuple(bearing.position for bearing in case.rotor.bearings
-                  if bearing.foundation == foundation.name)
-    channels = tuple(index[Channel(foundation.name, '', dof)] for dof in DOFS)
-    parts = () if isinstance(foundation.contact, Circle) else parts_of(foundation.contact)
+    centre = np.array([foundation.centre_x, foundation.centre_y, 0.0])
     height = foundation.height or BLOCK_SHARE * case.rotor.shaft_height
-    return Block(foundation.name, width, length, height,
-                 foundation.centre_y, seats, channels, foundation.height is None,
-                 centre_x=foundation.centre_x, parts=parts)
+    legs = tuple(_leg(rotor, place, bearing.position, height) - centre
+                 for _, rotor, place in placed(case) for bearing in rotor.bearings
+                 if bearing.foundation == foundation.name)
+    parts = () if isinstance(foundation.contact, Circle) else parts_of(foundation.contact)
+    return Block(foundation.name, width, length, height, foundation.centre_x, foundation.centre_y,
+                 legs, tuple(index[Channel(foundation.name, '', dof)] for dof in DOFS),
+                 foundation.height is None, depth, parts)
 
 
 def _bending(stations: Sequence[float], y: FloatArray) -> FloatArray:

@@ -19,6 +19,8 @@ MM_RMS = 1e3 / math.sqrt(2.0)  # [mm/s rms] per [m/s zero-to-peak]
 LIMITS = {'A/B': (70, 190, 90), 'B/C': (240, 180, 40), 'C/D': (230, 70, 60)}
 LIMITS_NS = NANOSECONDS
 BAND_NS = NANOSECONDS // 10
+# By which share an answer that lasts is another one than that of a speed that changes.
+STEADY, OTHER = 'steady', 0.02
 
 
 class TrendLines:
@@ -32,27 +34,50 @@ class TrendLines:
 
     def predicted(
         self, stamp_ns: IntArray, speed: FloatArray, displacement: ComplexArray,
+        steady: ComplexArray | None = None,
     ) -> None:
-        """Draw predictions (n, channels) [m, rad] at speeds [rad/s]."""
+        """
+        Draw predictions.
+
+        Parameters
+        ----------
+        stamp_ns, speed : (n,) arrays
+            When [ns], [rad/s].
+        displacement : (n, channels) complex array
+            [m, rad].
+        steady : (n, channels) complex array or None
+            As if each speed had been there for ever; drawn where it is something else.
+
+        """
         rows = self._recording.begins(f'{self._machine} predicted', stamp_ns, TREND_NS)
         if not len(rows):
             return
         stamps, speed, displacement = stamp_ns[rows], speed[rows], displacement[rows]
-        size, angle = np.abs(displacement), np.degrees(np.angle(displacement))
         self._recording.series(
             rr.new_entity_path([self._machine, 'speed']), stamps, rad_s_to_rpm(speed),
-            style=rr.SeriesLines(names='speed', colors=(210, 210, 210)))
+            style=rr.SeriesLines(names=self._machine, colors=(210, 210, 210)))
         for number, trend in enumerate(self._trends):
-            line = rr.SeriesLines(names=trend.channel, colors=trend.colour, widths=1.5)
-            self._recording.series(f'{trend.entity}/amplitude/predicted', stamps,
-                                   MICRO * size[:, number], style=line)
-            self._recording.series(
-                f'{trend.entity}/phase/predicted', stamps, angle[:, number],
-                style=rr.SeriesPoints(
-                    names=trend.channel, colors=trend.colour, marker_sizes=1.5))
-            if trend.kind == HOUSINGS:
-                self._recording.series(f'{trend.entity}/velocity/predicted', stamps,
-                                       MM_RMS * speed * size[:, number], style=line)
+            found = displacement[:, number]
+            self._answer(trend, 'predicted', stamps, speed, found, colour=trend.colour, width=1.5)
+            lasting = found if steady is None else steady[rows, number]
+            if np.any(np.abs(lasting - found) > OTHER * np.abs(lasting)):
+                self._answer(trend, STEADY, stamps, speed, lasting, colour=trend.pale, width=0.8)
+
+    def _answer(
+        self, trend: Trend, source: str, stamps: IntArray, speed: FloatArray,
+        found: ComplexArray, *, colour: tuple[int, int, int], width: float,
+    ) -> None:
+        """Draw amplitude, phase and, of a housing, velocity of one channel (n,) [m, rad]."""
+        name = f'{trend.channel} {STEADY}' if source == STEADY else trend.channel
+        line = rr.SeriesLines(names=name, colors=colour, widths=width)
+        self._recording.series(f'{trend.entity}/amplitude/{source}', stamps,
+                               MICRO * np.abs(found), style=line)
+        self._recording.series(
+            f'{trend.entity}/phase/{source}', stamps, np.degrees(np.angle(found)),
+            style=rr.SeriesPoints(names=name, colors=colour, marker_sizes=width))
+        if trend.kind == HOUSINGS:
+            self._recording.series(f'{trend.entity}/velocity/{source}', stamps,
+                                   MM_RMS * speed * np.abs(found), style=line)
 
     def band(self, events: Sequence[Band]) -> None:
         """Draw between which amplitudes the predictions lie."""

@@ -11,6 +11,7 @@ import rerun as rr
 
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.plant.together import plants_of
 from rotorsoil_ros.events import (
     Band,
     Compared,
@@ -32,6 +33,7 @@ from rotorsoil_ros.screen.channels import trends
 from rotorsoil_ros.screen.footer import Endings
 from rotorsoil_ros.screen.orbits import Orbits
 from rotorsoil_ros.screen.picture import FRAME_NS, Picture
+from rotorsoil_ros.screen.plant import PlantView, ShownPlant
 from rotorsoil_ros.screen.recording import Recording
 from rotorsoil_ros.screen.scene import Scene
 from rotorsoil_ros.screen.trends import TrendLines, ZoneLane
@@ -58,28 +60,38 @@ class RerunSink:
                        for name, machine in machines.items()}
         self._held_ns = 0 if url else HELD_NS
         self._basis: dict[tuple[str, type], Model | Expected] = {}
+        self._plants = [
+            ShownPlant(plant, names, self._shown[names[0]].scene)
+            for plant, names in plants_of(machines)]
         self._views: dict[str, MachineView] = {}
+        self._scenes: list[PlantView] = []
         self._layout = b''
         self.begin(path)
 
     def begin(self, path: Path | None) -> None:
         """Send what was collected, and go on in a new file that is whole in itself."""
         # The stream stays: rerun never frees one, nor its two threads.
-        for view in self._views.values():
+        for view in self._all:
             view.flush()
         # `footer` tells why there is none yet.
         file = [rr.FileSink(path, write_footer=False)] if path else []
         self._path = path
         viewer = [rr.GrpcSink(self._url)] if self._url else []
         if not file and not viewer:  # the disk takes none yet: rerun would keep all in memory
-            self._views = {}
+            self._views, self._scenes = {}, []
             return
         self._attach([*file, *viewer])
         recording = Recording(self._stream)
         self._views = {name: MachineView(recording, self._shown[name], machine)
                        for name, machine in self._machines.items()}
+        self._scenes = [PlantView(recording, plant, self._machines[plant.names[0]].table.channels)
+                        for plant in self._plants]
         for basis in self._basis.values():  # on which what follows rests
             self(basis)
+
+    @property
+    def _all(self) -> 'list[MachineView | PlantView]':
+        return [*self._views.values(), *self._scenes]
 
     def _attach(self, sinks: list[rr.FileSink | rr.GrpcSink]) -> None:
         """Stream to sinks from now on, which open with the layout of the views."""
@@ -88,7 +100,7 @@ class RerunSink:
             self._stream.set_sinks(*sinks)
             self._stream.log_file_from_contents(LAYOUT, self._layout)
         else:  # the first may be so short that bytes, which a thread reads, would come too late
-            layout = blueprint(self._shown)
+            layout = blueprint(self._shown, self._plants)
             self._stream.set_sinks(*sinks, default_blueprint=layout)
             self._layout = packed(self._stream, layout)
 
@@ -107,6 +119,9 @@ class RerunSink:
             self._basis[event.machine, type(event)] = event
         if view := self._views.get(event.machine):
             view.take(event)
+        if isinstance(event, Predicted):
+            for scene in self._scenes:
+                scene.take(event)
 
     def show(self, events: Iterable[Event]) -> None:
         """Collect events and send them."""
@@ -116,13 +131,13 @@ class RerunSink:
 
     def flush(self) -> None:
         """Send what was collected; into a file alone, some seconds at a time."""
-        for view in self._views.values():
+        for view in self._all:
             if view.held_ns >= self._held_ns:
                 view.flush()
 
     def close(self) -> None:
         """Send the rest and finish the recording."""
-        for view in self._views.values():
+        for view in self._all:
             view.flush()
         self._stream.disconnect()
         if self._ends and self._path is not None:
@@ -216,7 +231,9 @@ class MachineView:
         stamps = np.concatenate([event.stamp_ns for event in events])
         speed = np.concatenate([event.prediction.speed for event in events])
         displacement = np.concatenate([event.prediction.displacement for event in events])
-        self._trends.predicted(stamps, speed, displacement)
+        steady = [event.steady or event.prediction for event in events]
+        self._trends.predicted(stamps, speed, displacement, np.concatenate(
+            [lasting.displacement for lasting in steady]))
         self._bode.now(stamps, speed)
         self._orbits.predicted(stamps, displacement)
         if self._criteria is not None:
@@ -224,7 +241,7 @@ class MachineView:
                                 self._machine.case.zones)
         rows = self._recording.begins(self._shown.entity('picture'), stamps, FRAME_NS)
         if len(rows):
-            self._picture.draw(stamps[rows], speed[rows], displacement[rows])
+            self._picture.draw(stamps[rows], speed[rows, None], displacement[rows, None])
 
     def _send_moment(self, event: Event, stamp_ns: int) -> None:
         match event:

@@ -28,38 +28,11 @@ from rotorsoil_ros.screen.waterfall import (  # noqa: E402
     Waterfall,
 )
 
+from recordings import Paper  # noqa: E402
+
 START = 1_790_000_000_000_000_000
 SECOND = 10**9
 UNKNOWN = np.full((1, 1), np.nan)
-
-
-class Paper:
-    """A recording that keeps what is drawn as plain numbers."""
-
-    def __init__(self):
-        self.drawn = {}
-        self.stamps = {}
-
-    def still(self, entity, what):
-        for batch in what.as_component_batches():
-            self.drawn[entity, str(batch.component_descriptor().component)] = (
-                batch.as_arrow_array().to_pylist())
-
-    def send(self, entity, stamp_ns, columns):
-        self.stamps[entity] = stamp_ns.tolist()
-        for each in columns:
-            self.drawn[entity, str(each.component_descriptor().component)] = (
-                each.as_arrow_array().to_pylist())
-
-    def strips(self, entity, stamp_ns, strips):
-        self.stamps[entity] = stamp_ns.tolist()
-        self.drawn[entity, 'strips'] = strips
-
-    def series(self, *_, **__):
-        """Trends are held in test_viewer."""
-
-    def begins(self, _, stamp_ns, __):
-        return np.arange(len(stamp_ns))
 
 
 @pytest.fixture

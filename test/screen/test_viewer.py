@@ -1,5 +1,6 @@
 """The recording shows what an engineer looks for, at the time at which it happened."""
 
+from dataclasses import replace
 import warnings
 
 import numpy as np
@@ -18,6 +19,7 @@ from rotorsoil_ros.events import (
 )
 from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
+from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.screen import open_viewer, recorder
 
 from recordings import assert_whole, column, PERIOD, predicted, START
@@ -58,6 +60,23 @@ def test_phase_is_shown_in_degrees_and_speed_in_rpm(recorded, machine):
     assert phase == [[pytest.approx(np.degrees(np.angle(
         event.prediction.displacement[0, shown])))]]
     assert speed == [[pytest.approx(1909.859317)]]  # 200 * 60 / (2 pi)
+
+
+def test_what_would_last_stands_beside_an_answer_that_does_not(recorded, machine):
+    event = predicted(machine, [200.0, 200.0], period=5 * PERIOD)
+    lasting = Prediction.of_parts(event.prediction.speed, event.prediction.parts.copy())
+    shown = machine.table.channels.index('bearing_1_housing_z')
+    lasting.parts[..., shown] *= 2.0
+    path = recorded(replace(event, steady=lasting))
+    entity = '/fan/bearing_1/housing_z'
+    for quantity in ('amplitude', 'velocity'):
+        _, told = column(path, f'{entity}/{quantity}/predicted', 'Scalars:scalars')
+        _, still = column(path, f'{entity}/{quantity}/steady', 'Scalars:scalars')
+        np.testing.assert_allclose(still, 2.0 * np.array(told), rtol=1e-12)
+    _, names = column(path, f'{entity}/amplitude/steady', 'SeriesLines:names', static=True)
+    assert names == [['bearing_1_housing_z steady']]
+    # Where both are the same there is one line.
+    assert column(path, '/fan/disc_1/x/amplitude/steady', 'Scalars:scalars')[1] == []
 
 
 def test_trends_are_thinned_to_what_a_screen_shows_across_batches(recorded, machine):

@@ -14,12 +14,11 @@ from rotorsoil_ros.case import schema, stiffness_file
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.flexible import matrices, tables
-from rotorsoil_ros.case.flexible.ground import EACH
 from rotorsoil_ros.case.flexible.interface import Interface
 from rotorsoil_ros.channel import ACROSS, DOFS
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
-from rotorsoil_ros.machine.flexible.body import CONTACT, FlexibleBody, PROBE
+from rotorsoil_ros.machine.flexible.body import CONTACT, EACH, FlexibleBody, PROBE
 from rotorsoil_ros.machine.flexible.reduction import FiniteElements
 from rotorsoil_ros.machine.flexible.rigidity import ABOVE_EXCITATION
 from rotorsoil_ros.machine.foundation import Foundation

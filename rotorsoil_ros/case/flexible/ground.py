@@ -10,10 +10,8 @@ from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.bed import PatchesApart, WinklerBed
 from rotorsoil_ros.ground.soil import Contact, Rectangle, SoilModel
-from rotorsoil_ros.machine.flexible.body import Dof, FlexibleBody
+from rotorsoil_ros.machine.flexible.body import Dof, FlexibleBody, GREEN, WINKLER
 from rotorsoil_ros.machine.foundation import Foundation
-
-WINKLER, GREEN, EACH = 'winkler', 'green', 'each'
 
 
 def bed_of(

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.machine.flexible.part import Mount
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.neighbour import Neighbour
@@ -18,6 +19,9 @@ from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.shaft import Probe
 from rotorsoil_ros.units import rad_s_to_rpm
+
+if TYPE_CHECKING:
+    from rotorsoil_ros.case.config import Case
 
 # A shaft whose heading is off by less is along the blocks [rad].
 _STRAIGHT = 1e-6
@@ -88,11 +92,12 @@ class Berth:
     @property
     def running_beside(self) -> tuple[str, ...]:
         """Names of the other machines, those that stand left out."""
-        return tuple(name for name, one in zip(self._others, self.neighbours, strict=True)
+        return tuple(name for name, one in zip(self.others, self.neighbours, strict=True)
                      if one.speed)
 
     @property
-    def _others(self) -> tuple[str, ...]:
+    def others(self) -> tuple[str, ...]:
+        """Names of the other machines."""
         return (*self.names[:self.index], *self.names[self.index + 1:])
 
     @property
@@ -100,7 +105,7 @@ class Berth:
         """Where it stands and beside whom, in words."""
         beside = ', '.join(
             f'{name} ' + (f'at {rad_s_to_rpm(one.speed):g} rpm' if one.speed else 'standing')
-            for name, one in zip(self._others, self.neighbours, strict=True))
+            for name, one in zip(self.others, self.neighbours, strict=True))
         return (f'stands in {self.plant} at x {self.place.x:g} m, y {self.place.y:g} m, heading '
                 f'{math.degrees(self.place.heading):g} deg; beside it {beside or "nobody"}')
 
@@ -153,3 +158,19 @@ def renamed(rotor: Rotor, machine: str) -> Rotor:
         replace(probe, relative_to=f'{machine}_{probe.relative_to}') if probe.relative_to
         else probe for probe in of(rotor.probes))
     return replace(rotor, discs=of(rotor.discs), bearings=of(rotor.bearings), probes=probes)
+
+
+def placed(case: 'Case') -> tuple[tuple[str, Rotor, Placement], ...]:
+    """Return name, rotor and place of all that turns on the blocks of a case, its own first."""
+    berth = case.berth
+    if berth is None:
+        return ((case.name, case.rotor, Placement(is_upright=case.rotor.is_upright)),)
+    return ((case.name, case.rotor, berth.place), *(
+        (name, one.rotor, one.place)
+        for name, one in zip(berth.others, berth.neighbours, strict=True)))
+
+
+def mounts(case: 'Case') -> list[Mount]:
+    """Return where the bearings of all its rotors are."""
+    return [Mount(bearing, rotor.shaft_height, place)
+            for _, rotor, place in placed(case) for bearing in rotor.bearings]

@@ -195,6 +195,18 @@ class Plant:
                       np.array(parts))
 
 
+def plants_of(machines: Mapping[str, Machine]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield every plant of which several machines are answered, with the names of these."""
+    plants: dict[tuple[str, tuple[Channel, ...]], list[str]] = {}
+    for name, machine in machines.items():
+        berth = machine.case.berth
+        if berth is not None:
+            plants.setdefault((berth.plant, machine.table.channels), []).append(name)
+    for (plant, _), names in plants.items():
+        if len(names) > 1:
+            yield plant, tuple(names)
+
+
 def sources_of(path: Path, overrides: Sequence[str] = ()) -> tuple[str, ...]:
     """
     Return which machines of a case file each want an answer of their own.

@@ -13,8 +13,8 @@ from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import require, RotorSoilError
 
 SEAT, CONTACT, PROBE = 'seat', 'contact', 'probe'
-# The ground below a body that its own stiffness holds already.
-GROUNDED = 'grounded'
+# How the ground stands below several contacts; GROUNDED below a body that its own stiffness holds.
+WINKLER, GREEN, EACH, GROUNDED = 'winkler', 'green', 'each', 'grounded'
 
 # A residual may be negative by so much of its diagonal: six printed digits.
 _ROUND_OFF = 1e-5

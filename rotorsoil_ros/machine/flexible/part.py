@@ -1,7 +1,7 @@
 """What one foundation adds to a support: its motion over seats, contacts and probes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -46,8 +46,7 @@ class Mount:
     @property
     def axes(self) -> FloatArray:
         """Directions x and z of the machine in the axes of the ground, (2, 3)."""
-        return replace(self.place, x=0.0, y=0.0).seat_rows(
-            position=0.0, height=0.0, centre=(0.0, 0.0))[:, :3]
+        return self.place.axes[[0, 2]]
 
     def on(self, body: FlexibleBody) -> FloatArray:
         """
