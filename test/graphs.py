@@ -66,7 +66,7 @@ class Bench:
     def speaker(self, topic='/fan/joint_states', kind=JointState, listeners=('amplitude', 'phase'),
                 reliability=ReliabilityPolicy.RELIABLE):
         """Return what publishes, once everybody who matters has found each other."""
-        machine = topic.split('/')[1]
+        machine = topic.removeprefix('/').rpartition('/')[0].removesuffix('/rotor')
         publisher = self.graph.speaker(topic, kind, reliability)
         self.graph.until(lambda: all(
             self.probe.count_publishers(f'/rotorsoil/{machine}/{name}') for name in listeners),

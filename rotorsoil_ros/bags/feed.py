@@ -126,11 +126,11 @@ class Inputs:
 
     def inlets(self, monitor: Monitor, log: Outlet) -> dict[str, Inlet]:
         """Return what takes in the messages of each topic."""
+        spoken = '' if self.speed.is_usual else self.spoken
         return {topic: inlet(
-            each.place.name,
-            topic if self.speed.is_usual or not each.tells_speed else self.spoken, monitor,
-            log=log, speed=self.speed, message_type=each.source.type,
-            told=each.source.definition) for topic, each in self.topics.items()}
+            each.place.name, topic, monitor, log=log, speed=self.speed, spoken=spoken,
+            message_type=each.source.type, told=each.source.definition)
+            for topic, each in self.topics.items()}
 
     def descriptions(self) -> list[tuple[int, Mapping[str, Any]]]:
         """Return what a node told of its model, with the time when; what is malformed is not."""

@@ -82,20 +82,21 @@ def soil_keys(case: config.Case) -> list[str]:
     return keys
 
 
-def reload(file: Path, *, cache_directory: str | Path | None) -> Machine:
+def reload(
+    files: Sequence[Path], *, cache_directory: str | Path | None,
+) -> dict[Path, Machine]:
     """
-    Load a case file again, computed by another process if need be.
+    Load case files again, computed by other processes if need be.
 
     Raises
     ------
     InputError
-        If the case is wrong or cannot be solved.
+        If a case is wrong or cannot be solved.
 
     """
-    config.load(file, cache_directory=cache_directory)  # what is wrong with it is told as it is
-    directory = cache.directory(cache_directory)
-    tabulate([file], directory, tell=lambda text: None)
-    return _complete(file, cache_directory)
+    cases_of(files, cache_directory=cache_directory)  # what is wrong with them is told as it is
+    tabulate(files, cache.directory(cache_directory), tell=lambda text: None)
+    return {file: _complete(file, cache_directory) for file in files}
 
 
 def _complete(file: Path, cache_directory: str | Path | None) -> Machine:

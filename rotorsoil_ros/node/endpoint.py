@@ -1,6 +1,6 @@
 """One machine on the graph: its subscriptions, its monitor and its publishers."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from functools import partial
 from typing import Any
 
@@ -8,24 +8,23 @@ from rclpy.lifecycle import LifecycleNode, LifecyclePublisher
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from rotorsoil_ros.case.loading import reload
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Event, Level, Remark, Sink
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.node.criteria_feed import Bench
-from rotorsoil_ros.node.hearing import greeting, Hearing
+from rotorsoil_ros.node.hearing import greeting, Hearing, Told
 from rotorsoil_ros.node.interfaces import message_class
 from rotorsoil_ros.node.numbered import Numbered
-from rotorsoil_ros.node.parameters import Settings
-from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import RunLog
-from rotorsoil_ros.node.together import geared
+from rotorsoil_ros.node.settings import key, Settings
+from rotorsoil_ros.node.together import Together
 from rotorsoil_ros.units import rad_s_to_rpm
 from rotorsoil_ros.wire.dating import Arrival
 from rotorsoil_ros.wire.definitions import IMU, STRING, TEMPERATURE
 from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, OIL_TOPIC, raw_channel
 from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
+from rotorsoil_ros.wire.speeds import SpeedSource
 
 RAW_DEPTH = 1000  # samples kept while the node is busy
 OUTPUT = QoSProfile(depth=10)
@@ -38,11 +37,26 @@ class Watch:
 
     Messages stay bytes from the middleware to the monitor and back: what is published is what
     is logged, and what a foreign publisher sends cannot break the node.
+
+    Parameters
+    ----------
+    node : LifecycleNode
+        Of whose graph it takes part in.
+    name : str
+        Of the machine, first part of its topics; `<plant>/<machine>` in a plant.
+    machine : Machine
+        What is watched.
+    told : Told
+        What tells its speed.
+    plant : Together or None
+        What it does with those beside it.
+
     """
 
     def __init__(
         self, node: LifecycleNode, name: str, machine: Machine, *, settings: Settings,
-        log: RunLog, diagnostics: LifecyclePublisher, bench: Bench, sinks: Sequence[Sink] = (),
+        told: Told, log: RunLog, diagnostics: LifecyclePublisher, bench: Bench,
+        plant: Together | None = None,
     ) -> None:
         self.name = name
         self.is_active = False
@@ -51,22 +65,22 @@ class Watch:
         self._settings = settings
         self._subscriptions: list[Any] = []
         self._numbered: dict[str, Numbered] = {}
-        self._log, self._bench, self._others = log, bench, sinks
+        self._log, self._bench, self.plant = log, bench, plant
         self._arrival = Arrival(lambda: int(node.get_clock().now().nanoseconds))
         self._topics = self._publish(diagnostics)
         self._shown_channels = machine.table.channels
-        self._told: set[str] = set()
+        self._said: set[str] = set()
         self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks(),
                                judging=settings.judging(name, machine.case),
                                oils=machine.oils)
+        if plant is not None:
+            plant.join(self.monitor)
         self._raw_topics: dict[str, str] = {}
-        self._speed = geared(settings.speed(name), machine.case)
         try:
-            self._hearing = Hearing(node, name, self._speed, self._hear_speed)
+            self._hearing = Hearing(node, told, self._hear_speed)
         except InputError as error:
-            raise InputError(f'parameter {name}.speed: {error}') from error
+            raise InputError(f'parameter {key(name)}.speed: {error}') from error
         self._subscribe()
-        self._reloader = Reloader(node, name, load=self._load, take=self.take_machine)
 
     def begin(self, now_ns: int) -> None:
         """Greet, and answer from now on."""
@@ -95,9 +109,9 @@ class Watch:
             self._ask()
 
     def take_machine(self, machine: Machine) -> str:
-        """Answer from another case, from the next speed on; return what to say of it."""
+        """Answer from another case, from the next speed on; return what to add of it."""
         self._machine = machine
-        self._settings.renew_unbalance(self.name, machine.table.planes, machine.case.unbalance)
+        self._settings.renew_unbalance(self.name, machine)
         self.monitor.take_table(
             machine.table, self._unbalance(), sinks=self._sinks(),
             judging=self._settings.judging(self.name, machine.case), oils=machine.oils)
@@ -105,13 +119,11 @@ class Watch:
             self.monitor.describe(
                 self._node.get_clock().now().nanoseconds, self._description())
             self._ask()
-        shown = '' if self._is_shown else '; its channels are others: no longer shown by rerun'
-        return f'{self.name}: reloaded {machine.case.path}{shown}'
+        return '' if self._is_shown else '; its channels are others: no longer shown by rerun'
 
     def destroy(self) -> None:
         """Leave the graph."""
         self.is_active = False
-        self._reloader.destroy()
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         for publisher in self._own_publishers:
@@ -130,7 +142,9 @@ class Watch:
             self.name, self._machine.table.channels, self._topics, wants_steady=lambda: (
                 is_written or any(publisher.get_subscription_count() for publisher in steady)))
         outlets = [self._send, self._log.write] if is_written else [self._send]
-        sinks: list[Sink] = [Messenger(encoder, outlets), self._tell, *self._others]
+        sinks: list[Sink] = [Messenger(encoder, outlets), self._tell]
+        if self.plant is not None:
+            sinks.append(self.plant)
         return [*sinks, self._log.show] if self._is_shown and self._log.is_shown else sinks
 
     def _tell(self, event: Event) -> None:
@@ -143,9 +157,6 @@ class Watch:
         self._bench.ask(self.name, self._machine, self._unbalance(),
                         self.monitor.judge.take_criteria)
 
-    def _load(self) -> Machine:
-        return reload(self._settings.case_file(self.name), cache_directory=self._settings.cache)
-
     def _look_who_speaks(self) -> None:
         """Count who tells the speed; name them when they are several."""
         health = self.monitor.health
@@ -155,8 +166,8 @@ class Watch:
 
     def _say_once(self, text: str) -> None:
         """Say something on the terminal, and nothing if it was said before."""
-        if text not in self._told:
-            self._told.add(text)
+        if text not in self._said:
+            self._said.add(text)
             self._node.get_logger().warning(f'{self.name}: {text}')
 
     def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
@@ -195,12 +206,15 @@ class Watch:
         self._take(inlet(name, topic, self.monitor, log=self._log.write), topic, kind, depth,
                    lost_as='measurements_dropped')
 
-    def _hear_speed(self, name: str, topic: str, kind: str, told: str) -> None:
+    def _hear_speed(
+        self, name: str, topic: str, kind: str, told: str, source: SpeedSource,
+    ) -> None:
         """Subscribe to what tells the speed; it is logged as a plain node would hear it."""
-        plain = topic if self._speed.is_usual else str(
-            self._node.resolve_topic_name(f'{self.name}/joint_states'))
-        self._take(inlet(name, plain, self.monitor, log=self._log.write, speed=self._speed,
-                         message_type=kind, told=told),
+        own, plain = (str(self._node.resolve_topic_name(f'{self.name}/{each}'))
+                      for each in (name, 'joint_states'))
+        self._take(inlet(name, topic, self.monitor, log=self._log.write, speed=source,
+                         message_type=kind, told=told,
+                         spoken='' if source.is_usual and topic == own else plain),
                    topic, kind, self._settings.value('speed_depth'), lost_as='dropped')
 
     def _take(self, taken_in: Inlet, topic: str, kind: str, depth: int, *, lost_as: str) -> None:
@@ -226,7 +240,7 @@ class Watch:
                 publish(payload)
 
     def _unbalance(self) -> Any:
-        return self._settings.unbalance(self.name, self._machine.table.planes)
+        return self._settings.unbalance(self.name, self._machine)
 
     def _description(self) -> Any:
         return self._machine.description(self.name, self._unbalance())

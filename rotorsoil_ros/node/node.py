@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
+from functools import partial
 import gc
 import sys
 import traceback
@@ -27,15 +28,17 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from rotorsoil_ros.case import cache
-from rotorsoil_ros.case.loading import load_all
+from rotorsoil_ros.case.loading import load_all, reload
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import plants_of
 from rotorsoil_ros.errors import BAD_INPUT, InputError, RotorSoilError
 from rotorsoil_ros.node.criteria_feed import Bench
 from rotorsoil_ros.node.endpoint import OUTPUT, Watch
-from rotorsoil_ros.node.parameters import described, Settings
+from rotorsoil_ros.node.parameters import described
+from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
-from rotorsoil_ros.node.together import Together
+from rotorsoil_ros.node.settings import key, of_discs, Settings
+from rotorsoil_ros.node.together import refuse_clashes, Together, told_of
 from rotorsoil_ros.stop import Stop
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
@@ -68,8 +71,9 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
     def __init__(self, **options: Any) -> None:
         super().__init__(NODE_NAME, **options)
         self.settings = Settings(self)
-        self._watches: list[Watch] = []
-        self._together: list[Together] = []
+        self._watches: dict[str, Watch] = {}
+        self._plants: dict[str, Together] = {}  # by the name of each machine in them
+        self._reloaders: dict[str, Reloader] = {}
         self._log: RunLog | None = None
         self._diagnostics: LifecyclePublisher | None = None
         self._bench: Bench | None = None
@@ -107,14 +111,14 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Publish."""
         result = super().on_activate(state)
-        for watch in self._watches:
+        for watch in self._watches.values():
             watch.begin(self._now_ns())
         self.get_logger().info('active')
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Fall silent; logs stay open."""
-        for watch in self._watches:
+        for watch in self._watches.values():
             watch.is_active = False
         return super().on_deactivate(state)
 
@@ -140,7 +144,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         held.callback(self._forget)
         for name, machine in machines.items():
             held.callback(settings.forget_unbalance, name)
-            settings.declare_unbalance(name, machine.table.planes, machine.case.unbalance)
+            settings.declare_unbalance(name, machine)
         logger = self.get_logger()
         log = RunLog(
             self._log_settings(), machines, tell=logger.info, complain=logger.error)
@@ -149,47 +153,83 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         held.callback(bench.close)
         diagnostics = self.create_lifecycle_publisher(DiagnosticArray, DIAGNOSTICS_TOPIC, OUTPUT)
         held.callback(self.destroy_lifecycle_publisher, diagnostics)
-        self._together = [Together(self, plant, names, machines[names[0]].table.channels, log=log,
-                                   diagnostics=diagnostics)
-                          for plant, names in plants_of(machines)]
-        for together in self._together:
-            held.callback(together.destroy)
-        for name, machine in machines.items():
-            watch = Watch(self, name, machine, settings=settings, log=log,
-                          diagnostics=diagnostics, bench=bench, sinks=[
-                              one for one in self._together if one.adds(name)])
-            held.callback(watch.destroy)
-            self._watches.append(watch)
+        self._log, self._diagnostics, self._bench = log, diagnostics, bench
+        self._watch(machines, log, diagnostics, bench)
         self._hand_out(settings.unknown())
         for period_s, act in ((PERIOD_S / len(machines), self._tick), (FLUSH_S, log.flush)):
             timer = self.create_timer(
                 period_s, act, clock=Clock(clock_type=ClockType.STEADY_TIME))
             held.callback(self.destroy_timer, timer)
-        self._log, self._diagnostics, self._bench = log, diagnostics, bench
         settings.is_locked = True
         where = f', log {log.path}' if log.path else ''
         self.get_logger().info(f'watching {", ".join(machines)}{where}')
 
+    def _watch(
+        self, machines: dict[str, Machine], log: RunLog, diagnostics: LifecyclePublisher,
+        bench: Bench,
+    ) -> None:
+        """Take part in the graph for every machine, plant and entry."""
+        plants = plants_of(machines)
+        refuse_clashes(plants, machines)
+        for plant, among in plants.items():
+            together = Together(self, plant, among, log=log, diagnostics=diagnostics)
+            self._held.callback(together.destroy)
+            self._plants |= dict.fromkeys(among, together)
+        for name, machine in machines.items():
+            self._watches[name] = watch = Watch(
+                self, name, machine, settings=self.settings, log=log, diagnostics=diagnostics,
+                bench=bench, told=told_of(name, machines, plants, self.settings),
+                plant=self._plants.get(name))
+            self._held.callback(watch.destroy)
+        for entry in self.settings.files:
+            self._reloaders[entry] = reloader = Reloader(
+                self, entry, load=partial(self._load_again, entry),
+                take=partial(self._take, entry))
+            self._held.callback(reloader.destroy)
+
     def _hand_out(self, slips: Sequence[str]) -> None:
         """Let each machine tell what is wrong with how it was set up; the first what is of all."""
-        for number, watch in enumerate(self._watches):
-            others = [f'parameter {each.name}.' for each in self._watches if each is not watch]
-            watch.monitor.health.slips = tuple(
-                slip for slip in slips if slip.startswith(f'parameter {watch.name}.')
-                or (number == 0 and not slip.startswith(tuple(others))))
+        of_whom: dict[str, list[str]] = {name: [] for name in self._watches}
+        for slip in slips:
+            own = [name for name in of_whom if slip.startswith(f'parameter {key(name)}.')]
+            # Of a plant the first machine tells what is of none of them.
+            of_plant = [name for name in of_whom
+                        if slip.startswith(f'parameter {name.partition("/")[0]}.')]
+            of_whom[[*own, *of_plant, *of_whom][0]].append(slip)
+        for name, watch in self._watches.items():
+            watch.monitor.health.slips = tuple(of_whom[name])
 
     def _load(self) -> dict[str, Machine]:
         """Load every machine, each case file once."""
-        files = {name: self.settings.case_file(name) for name in self.settings.machines}
+        files = {name: file for each in self.settings.files.values()
+                 for name, file in each.items()}
         by_file = load_all(files.values(), cache_directory=self.settings.cache,
                            tell=self.get_logger().info)
         return {name: by_file[file] for name, file in files.items()}
 
+    def _load_again(self, entry: str) -> dict[str, Machine]:
+        """Load a machine, or all of a plant, which have to be those that are watched."""
+        files, before = self.settings.case_files(entry), self.settings.files[entry]
+        if files.keys() != before.keys():
+            raise InputError(f'{entry}: machines must be {", ".join(before)} as before, got '
+                             f'{", ".join(files)}; to watch others clean up and configure again')
+        by_file = reload([*files.values()], cache_directory=self.settings.cache)
+        return {name: by_file[file] for name, file in files.items()}
+
+    def _take(self, entry: str, machines: dict[str, Machine]) -> str:
+        """Answer from other cases; return what to say of it."""
+        watches = [self._watches[name] for name in machines]
+        plant, machine = watches[0].plant, machines[watches[0].name]
+        if plant is not None and plant.name == entry:
+            plant.take_channels(machine.table.channels)
+        said = {watch.take_machine(machines[watch.name]) for watch in watches}
+        return f'{entry}: reloaded {machine.case.path}{"".join(said)}'
+
     def _forget(self) -> None:
         self.settings.is_locked = False
         self._turn = 0
-        self._watches, self._log, self._diagnostics, self._bench = [], None, None, None
-        self._together = []
+        self._watches, self._log, self._diagnostics, self._bench = {}, None, None, None
+        self._plants, self._reloaders = {}, {}
 
     def _log_settings(self) -> LogSettings:
         value = self.settings.value
@@ -209,13 +249,12 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
                 self._bench.step()
             if self._log is not None:
                 self._report_log(self._log)
-            for together in self._together:
-                together.tick(self._now_ns(),
-                              stale_after_s=float(self.settings.value('stale_after_s')))
         # In turns: fifty at once would keep the speeds of all waiting.
-        self._watches[turn].tick(
-            self._now_ns(), stale_after_s=float(self.settings.value('stale_after_s')),
-            topics=self._topics)
+        watch, stale_after_s = [*self._watches.values()][turn], float(
+            self.settings.value('stale_after_s'))
+        watch.tick(self._now_ns(), stale_after_s=stale_after_s, topics=self._topics)
+        if watch.plant is not None and [*watch.plant.monitors][-1] == watch.name:
+            watch.plant.tick(self._now_ns(), stale_after_s=stale_after_s)
 
     def _look_for_namesakes(self) -> None:
         """Tell if another node has the same name: both answer on the same topics."""
@@ -240,8 +279,8 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
                 self._diagnostics.topic_name, DIAGNOSTICS, [report.stamp_ns], [payload]))
 
     def _take_parameters(self, parameters: list[Parameter]) -> None:
-        for watch in () if self.settings.is_changing else self._watches:
-            own = f'{watch.name}.unbalance.'
+        for watch in () if self.settings.is_changing else self._watches.values():
+            own = of_discs(watch.name)
             if any(parameter.name.startswith(own) for parameter in parameters):
                 watch.take_unbalance(self._now_ns())
 

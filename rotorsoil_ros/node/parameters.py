@@ -1,40 +1,25 @@
 """Which parameters does the node have, and what may they be."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from difflib import get_close_matches
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 import math
-from pathlib import Path
 import re
 from typing import Any, TypeAlias
 
-import numpy as np
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from rotorsoil_ros.arrays import ComplexArray
-from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.document import located
-from rotorsoil_ros.case.loading import cases_of
-from rotorsoil_ros.case.plant.together import sources_of
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.rules import Judging, Matching
-from rotorsoil_ros.units import rpm_to_rad_s, SPEED_UNITS
-from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedSource, USUAL
+from rotorsoil_ros.units import SPEED_UNITS
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT, USUAL
 
 Rule: TypeAlias = Callable[[Any], str]
 
 LARGEST_MOMENT = 1e3  # [kg m]
-OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
 
 
 def number(*, unit: str, lowest: float = -math.inf, highest: float = math.inf) -> Rule:
@@ -114,7 +99,7 @@ def quantity(
 
 OWN = {
     'machines': Setting(
-        [], 'Names of the machines, each the first part of its topics.',
+        [], 'Names of the machines and plants, each the first part of its topics.',
         pattern('[a-z][a-z0-9_]*', 'different names of a-z, 0-9 and _ that begin with a letter')),
     'speed_reliability': Setting(
         'best_effort', 'Reliability asked of speed topics: best_effort or reliable.',
@@ -162,7 +147,8 @@ OWN = {
         'new ones, zero: they never do', 'MiB', span=(0.0, 1e9)),
 }
 OF_MACHINE = {
-    'case': Setting('', 'Case file of the machine (YAML), or the name of a shipped case.'),
+    'case': Setting('', 'Case file (YAML), or the name of a shipped case: of one machine, or of a '
+                    'plant, all running machines of which are <machine>/<one of them>.'),
     'rotor_joint': Setting(
         ROTOR_JOINT, 'Joint of joint_states whose velocity is the rotor speed.'),
     'speed.topic': Setting(
@@ -183,6 +169,12 @@ OF_MACHINE = {
         span=(0.0, 1e6)),
 }
 
+# Of a machine of a plant, whose file is the plant's.
+OF_PLANT_MACHINE = {name: setting for name, setting in OF_MACHINE.items() if name != 'case'} | {
+    'rotor_joint': replace(OF_MACHINE['rotor_joint'], default='', meaning=(
+        'The same in a plant; empty: rotor in joint_states of the machine, its name in those of '
+        'the plant.'))}
+
 
 def of_unbalance(value: complex) -> dict[str, Setting]:
     """Return the parameters of the unbalance of one disc, as its case has it."""
@@ -200,186 +192,12 @@ def of_unbalance(value: complex) -> dict[str, Setting]:
 def described() -> str:
     """Return every parameter with its default and what it is, for a terminal."""
     lines = []
+    joint = {'rotor_joint': OF_PLANT_MACHINE['rotor_joint']}
     for prefix, settings in (('', OWN), ('<machine>.', OF_MACHINE), (
-            '<machine>.unbalance.<disc>.', of_unbalance(0j))):
+            '<machine>.unbalance.<disc>.', of_unbalance(0j)), ('<plant>.<machine>.', joint)):
         for name, setting in settings.items():
             default = 'as in the case' if 'unbalance' in prefix else repr(setting.default)
             lines.append(f'  {prefix}{name} ({default})\n      {setting.meaning}')
+    lines.append('  <plant>.<machine>.speed..., .slow_roll_rpm, .unbalance...\n'
+                 '      As of a machine of its own.')
     return '\n'.join(lines)
-
-
-class Settings:
-    """The parameters of one node: declared, read, and guarded against nonsense."""
-
-    def __init__(self, node: Node) -> None:
-        self.is_locked = self.is_changing = False
-        self._node = node
-        self._known: dict[str, Setting] = {}
-        self._of_case: dict[str, complex] = {}
-        self._declare(OWN)
-        self._declare_machines()
-        node.add_on_set_parameters_callback(self._judge)
-        node.add_post_set_parameters_callback(self._follow)
-
-    @property
-    def known(self) -> tuple[str, ...]:
-        """Names of all parameters that are declared."""
-        return tuple(self._known)
-
-    def value(self, name: str) -> Any:
-        """Return a value that obeys its rule."""
-        value = self._node.get_parameter_or(name, Parameter(name, value=None)).value
-        if value is None:
-            value = self._known[name].default
-        if fault := self._known[name].fault(value):
-            raise InputError(f'parameter {name}: {fault}')
-        return value
-
-    def unknown(self) -> list[str]:
-        """Return what was set under a name that no parameter has, with the near one."""
-        told = []
-        for name in self._node._parameter_overrides:
-            if name not in self._known and name.split('.')[0] not in OF_ROS:
-                near = get_close_matches(name, self._known, n=1)
-                told.append(f'parameter {name} is not known'
-                            + (f'; did you mean {near[0]}?' if near else ''))
-        return told
-
-    def check(self) -> None:
-        """Raise InputError with all that is wrong: values, and the cases that they name."""
-        found: list[str] = []
-
-        def told(read: Callable[[], Any]) -> Any:
-            try:
-                return read()
-            except InputError as error:
-                found.append(str(error))
-                return None
-
-        for name in self._known:
-            told(partial(self.value, name))
-        names = told(lambda: self.machines) or []
-        files = [told(partial(self.case_file, name)) for name in names]
-        for name in names:
-            if not any(fault.startswith(f'parameter {name}.speed') for fault in found):
-                told(partial(self.speed, name))
-        if found:
-            told(lambda: cases_of(filter(None, files), cache_directory=self.cache))
-            raise InputError('\n'.join(dict.fromkeys(found)))
-
-    @property
-    def machines(self) -> list[str]:
-        """Names of the machines, at least one."""
-        names = list(self.value('machines'))
-        if not names:
-            raise InputError('parameter machines: must name at least one machine, got none')
-        return names
-
-    def case_file(self, machine: str) -> Path:
-        """Return the case file of a machine; of several in it that of its name, or `FILE#NAME`."""
-        path, mark, source = self.value(f'{machine}.case').partition('#')
-        if not path:
-            raise InputError(f'parameter {machine}.case: must be the path of a case file')
-        file = located(Path(path))
-        if not mark and file.is_file() and machine in sources_of(file):
-            mark, source = '#', machine
-        return Path(f'{file}{mark}{source}')
-
-    @property
-    def cache(self) -> Path | None:
-        """Directory of the cache, None for the usual one."""
-        return Path(self.value('cache')).expanduser() if self.value('cache') else None
-
-    def speed(self, machine: str) -> SpeedSource:
-        """Return what tells the speed of a machine."""
-        said = {name: self.value(f'{machine}.speed.{name}')
-                for name in ('topic', 'type', 'field', 'unit')}
-        try:
-            return SpeedSource(
-                ratio=float(self.value(f'{machine}.speed.ratio')),
-                joint=self.value(f'{machine}.rotor_joint'), **said)
-        except InputError as error:
-            raise InputError(f'parameter {machine}.speed: {error}') from error
-
-    def judging(self, machine: str, case: Case) -> Judging:
-        """Return how measurements of a machine are held against its predictions."""
-        slow_roll = float(self.value(f'{machine}.slow_roll_rpm'))
-        return Judging.of(
-            case, turns=float(self.value('vector_turns')),
-            band_period_s=float(self.value('band_period_s')),
-            matching=Matching(
-                tolerance=float(self.value('match_tolerance_s')),
-                slow_roll_speed=rpm_to_rad_s(slow_roll) if slow_roll else math.nan))
-
-    def declare_unbalance(
-        self, machine: str, discs: Sequence[str], unbalance: ComplexArray,
-    ) -> None:
-        """Declare the unbalance of every disc, as its case has it."""
-        for disc, value in zip(discs, unbalance.tolist(), strict=True):
-            own = f'{machine}.unbalance.{disc}'
-            self._of_case[own] = value
-            self._declare({f'{own}.{name}': setting
-                           for name, setting in of_unbalance(value).items()})
-
-    def forget_unbalance(self, machine: str) -> None:
-        """Remove what was declared of the unbalance of a machine."""
-        for name in [name for name in self._known if name.startswith(f'{machine}.unbalance.')]:
-            del self._known[name]
-            if self._node.has_parameter(name):  # one that was refused never came into being
-                self._node.undeclare_parameter(name)
-
-    def renew_unbalance(
-        self, machine: str, discs: Sequence[str], unbalance: ComplexArray,
-    ) -> None:
-        """Take the unbalance of another case; what somebody has set stays set."""
-        own = f'{machine}.unbalance.'
-        kept = [Parameter(name, value=self.value(name)) for name, setting in self._known.items()
-                if name.startswith(own) and self.value(name) != setting.default]
-        self.is_changing = True
-        try:
-            self.forget_unbalance(machine)
-            self.declare_unbalance(machine, discs, unbalance)
-            self._node.set_parameters(
-                [parameter for parameter in kept if parameter.name in self._known])
-        finally:
-            self.is_changing = False
-
-    def unbalance(self, machine: str, discs: Sequence[str]) -> ComplexArray:
-        """Return moment * exp(i phase) of every disc, (discs,) [kg m]."""
-        return np.array([self._unbalance(f'{machine}.unbalance.{disc}') for disc in discs])
-
-    def _unbalance(self, own: str) -> complex:
-        names = f'{own}.moment', f'{own}.phase'
-        moment, phase = (float(self.value(name)) for name in names)
-        if (moment, phase) == tuple(self._known[name].default for name in names):
-            # Through moment and phase it would differ in its last bit, live from offline.
-            return self._of_case[own]
-        return complex(moment * math.cos(phase), moment * math.sin(phase))
-
-    def _declare(self, settings: Mapping[str, Setting]) -> None:
-        for name, setting in settings.items():
-            if name not in self._known:
-                self._known[name] = setting
-                setting.declare(self._node, name)
-
-    def _declare_machines(self) -> None:
-        for machine in self._node.get_parameter_or('machines').value or []:
-            self._declare({f'{machine}.{name}': setting for name, setting in OF_MACHINE.items()})
-
-    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Refuse nonsense with the reason; what was set before stays."""
-        for parameter in parameters:
-            setting = self._known.get(parameter.name)
-            if setting is None:
-                continue
-            fault = setting.fault(parameter.value)
-            if not fault and self.is_locked and not setting.acts_at_once:
-                fault = 'is read when the node is configured: clean it up first'
-            if fault:
-                return SetParametersResult(successful=False, reason=f'{parameter.name} {fault}')
-        return SetParametersResult(successful=True)
-
-    def _follow(self, parameters: list[Parameter]) -> None:
-        """Declare the parameters of machines that were just named."""
-        if any(parameter.name == 'machines' for parameter in parameters):
-            self._declare_machines()

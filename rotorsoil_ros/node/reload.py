@@ -15,20 +15,20 @@ RELOAD_GLANCE_S = 0.05
 
 class Reloader:
     """
-    The service `~/<machine>/reload`, which answers when the outcome is known.
+    The service `~/<name>/reload` of a machine or plant, which answers when the outcome is known.
 
     A thread reads the case file, which may have to solve oil films for that, and waits for the
-    table, which another process computes; the executor only swaps what is ready, so that a speed
+    tables, which other processes compute; the executor only swaps what is ready, so that a speed
     is answered from the old case or from the new one.
     """
 
     def __init__(
-        self, node: LifecycleNode, name: str, *, load: Callable[[], Machine],
-        take: Callable[[Machine], str],
+        self, node: LifecycleNode, name: str, *, load: Callable[[], dict[str, Machine]],
+        take: Callable[[dict[str, Machine]], str],
     ) -> None:
         self._node, self._name = node, name
         self._load, self._take = load, take
-        self._errand: Errand[Machine] | None = None
+        self._errand: Errand[dict[str, Machine]] | None = None
         self._asked: tuple[Any, Any] | None = None  # response and header of who waits
         self._timer = node.create_timer(
             RELOAD_GLANCE_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))

@@ -61,8 +61,8 @@ class RerunSink:
         self._held_ns = 0 if url else HELD_NS
         self._basis: dict[tuple[str, type], Model | Expected] = {}
         self._plants = [
-            ShownPlant(plant, names, self._shown[names[0]].scene)
-            for plant, names in plants_of(machines)]
+            ShownPlant(plant, tuple(among), self._shown[next(iter(among))].scene)
+            for plant, among in plants_of(machines).items()]
         self._views: dict[str, MachineView] = {}
         self._scenes: list[PlantView] = []
         self._layout = b''

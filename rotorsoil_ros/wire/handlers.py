@@ -47,12 +47,12 @@ class SpeedInlet:
 
     def __init__(
         self, topic: str, message_type: str, monitor: Monitor, *, source: SpeedSource,
-        log: Outlet, told: str = '',
+        log: Outlet, told: str = '', spoken: str = '',
     ) -> None:
-        self._topic, self._type = topic, message_type
+        self._topic, self._type = spoken or topic, message_type
         self._monitor = monitor
         self._log = log
-        self._writer = None if source.is_usual else JointStateWriter([ROTOR_JOINT])
+        self._writer = JointStateWriter([ROTOR_JOINT]) if spoken else None
         monitor.health.speed_unit = source.unit
         self._reader = SpeedReader(message_type, source, note=monitor.health.note,
                                    explain=monitor.health.explain, told=told)
@@ -170,7 +170,7 @@ def raw_channel(name: str) -> Channel | None:
 
 def inlet(
     name: str, topic: str, monitor: Monitor, *, log: Outlet,
-    speed: SpeedSource = USUAL, message_type: str = '', told: str = '',
+    speed: SpeedSource = USUAL, message_type: str = '', told: str = '', spoken: str = '',
 ) -> Inlet:
     """
     Return what takes in the messages of one of TOPICS, or of raw samples.
@@ -187,6 +187,8 @@ def inlet(
         What in its messages is the speed.
     message_type, told : str
         Type of a speed topic, and its definition, where they are not the usual ones.
+    spoken : str
+        Topic under which speeds are logged as they were understood; empty: as they came.
 
     """
     if channel := raw_channel(name):
@@ -197,7 +199,7 @@ def inlet(
                             partial(_tell_oil, monitor), note=monitor.health.note, log=log)
     if name in SPEED_TOPICS:
         return SpeedInlet(topic, message_type or SPEED_TOPICS[name], monitor, source=speed,
-                          log=log, told=told)
+                          log=log, told=told, spoken=spoken)
     quantity = name.removeprefix('measured/')
     return StampedInlet(topic, JOINT_STATE, JointStateReader(),
                         _Vectors(monitor, quantity),

@@ -1,6 +1,6 @@
 """How an event reads as ROS messages: the one mapping, used by publishers and logs alike."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import math
@@ -269,14 +269,18 @@ def log_message(event: Remark, *, node: str = NODE_NAME) -> bytes:
     """Return a remark as the message of every ROS log."""
     return encode(LOG, {
         'stamp': _time(event.stamp_ns), 'level': SEVERITY[event.level],
-        'name': f'{node.replace("/", ".")}.{event.machine}', 'msg': event.text})
+        'name': f'{node}/{event.machine}'.replace('/', '.'), 'msg': event.text})
 
 
 def diagnostic_array(event: Diagnostics, *, node: str = NODE_NAME) -> bytes:
     """Return the health of a machine as the message that every ROS monitor reads."""
-    return encode(DIAGNOSTICS, {
-        'header': {'stamp': _time(event.stamp_ns)},
-        'status': [_status(each, node) for each in (event, *event.parts)]})
+    return statuses((event, *event.parts), event.stamp_ns, node=node)
+
+
+def statuses(events: Iterable[Diagnostics], stamp_ns: int, *, node: str) -> bytes:
+    """Return any number of such, also none, as one message."""
+    return encode(DIAGNOSTICS, {'header': {'stamp': _time(stamp_ns)},
+                                'status': [_status(each, node) for each in events]})
 
 
 def _time(stamp_ns: int) -> dict[str, int]:

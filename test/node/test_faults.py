@@ -59,7 +59,7 @@ def test_a_case_is_reloaded_while_speeds_are_answered(bench, case, machine):
     old = ask(bench, publish, amplitude, 300.0, 0)
     case.write_text(case.read_text().replace('mass: 42.0', 'mass: 420.0'))
     reloading = bench.ask(Trigger, '/rotorsoil/fan/reload', Trigger.Request())
-    bench.graph.until(lambda: node._watches[0]._reloader._errand, 'the errand')
+    bench.graph.until(lambda: node._reloaders['fan']._errand, 'the errand')
     assert reload(bench).message.endswith('a reload is under way')
     asked = 0
     while not reloading.done():  # it computes, and speeds are answered
@@ -71,7 +71,7 @@ def test_a_case_is_reloaded_while_speeds_are_answered(bench, case, machine):
     new = ask(bench, publish, amplitude, 300.0, asked + 1)  # what is answered has happened
     assert new.position != old.position
     assert node.get_parameter('fan.unbalance.disc_2.moment').value == 2e-5  # what was set stays
-    new_key = node._watches[0].monitor.table.key
+    new_key = node._watches['fan'].monitor.table.key
     assert new_key != machine.table.key
     bench.graph.until(lambda: model and json.loads(model[-1].data)['tables'] == {
         'response': new_key}, 'the new model')
@@ -106,7 +106,7 @@ def test_who_waits_for_a_reload_is_told_when_the_node_is_cleaned_up(bench, case)
     node = bench.active('fan', fan__case=str(case))
     case.write_text(case.read_text().replace('mass: 42.0', 'mass: 421.0'))
     reloading = bench.ask(Trigger, '/rotorsoil/fan/reload', Trigger.Request())
-    bench.graph.until(lambda: node._watches[0]._reloader._asked, 'who waits')
+    bench.graph.until(lambda: node._reloaders['fan']._asked, 'who waits')
     node.release()
     bench.graph.until(reloading.done, 'the answer')
     assert not reloading.result().success
@@ -116,10 +116,10 @@ def test_who_waits_for_a_reload_is_told_when_the_node_is_cleaned_up(bench, case)
 def test_who_waits_for_a_reload_is_answered_where_taking_it_raises(bench):
     node = bench.active('fan')
 
-    def refuse(machine):
-        raise RotorSoilError(f'{machine.case.name} cannot be taken')
+    def refuse(machines):
+        raise RotorSoilError(f'{machines["fan"].case.name} cannot be taken')
 
-    node._watches[0]._reloader._take = refuse
+    node._reloaders['fan']._take = refuse
     reloading = bench.ask(Trigger, '/rotorsoil/fan/reload', Trigger.Request())
     with pytest.raises(RotorSoilError, match='cannot be taken'):
         bench.graph.until(lambda: False, 'the failure')
@@ -134,7 +134,7 @@ def test_a_reload_works_with_other_discs_and_the_single_executor(graph, cache, c
     node = bench.active('fan', fan__case=str(case))
     case.write_text(case.read_text().replace('disc_2', 'wheel'))
     assert reload(bench).success
-    assert 'wheel_x' in node._watches[0].monitor.table.channels
+    assert 'wheel_x' in node._watches['fan'].monitor.table.channels
     assert node.has_parameter('fan.unbalance.wheel.moment')
     assert not node.has_parameter('fan.unbalance.disc_2.moment')
     amplitude, _ = bench.answers()
@@ -171,7 +171,7 @@ def test_two_publishers_of_one_speed_are_warned_of_by_name(bench, capfd):
         return '/probe on /fan/joint_states, /rival on /fan/rotor/speed' in ''.join(seen)
 
     bench.graph.until(warned, 'the warning')
-    assert node._watches[0].monitor.health.publishers == 2
+    assert node._watches['fan'].monitor.health.publishers == 2
     bench.graph.nodes.remove(rival)
     rival.destroy_node()
 
@@ -203,7 +203,7 @@ def test_stamps_that_stand_still_or_jump_back_are_answered_and_counted(bench, ma
     assert [stamp_ns(message) for message in amplitude[:4]] == stamps[:4]
     assert stamp_ns(amplitude[4]) > STAMP + 10**9
     assert_answers(amplitude[2], phase[2], exact(machine, 300.0))
-    counts = node._watches[0].monitor.health.counts
+    counts = node._watches['fan'].monitor.health.counts
     assert (counts['repeated_stamp'], counts['backward_stamp'], counts['answered']) == (1, 1, 5)
     assert counts['stamp_not_set'] == 1
     node._log.flush()

@@ -145,7 +145,7 @@ def test_standing_still_is_no_warning(bench):
     assert {status.level for each in diagnostics for status in each.status
             if 'stands' in status.message} == {b'\0'}
     assert np.isnan(amplitude[0].position).all()
-    assert node._watches[0].monitor.health.counts['standing'] == 1
+    assert node._watches['fan'].monitor.health.counts['standing'] == 1
 
 
 @pytest.mark.parametrize('parameters, words', [

@@ -21,7 +21,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
-from rotorsoil_ros.case.config import load
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.events import Level
 
 from graphs import assert_answers, exact, joint_state, LATCHED, STAMP, stamp_ns
@@ -72,7 +72,7 @@ def test_speeds_that_find_no_room_are_counted_and_told(bench, executor):
     bench.graph.until(lambda: amplitude, 'the first answer')
     for step in range(1, 201):  # while nobody takes them
         publish(joint_state([300.0], stamp=STAMP + step))
-    counts = node._watches[0].monitor.health.counts
+    counts = node._watches['fan'].monitor.health.counts
     bench.graph.until(lambda: stamp_ns(amplitude[-1]) == STAMP + 200, 'the last answer')
     assert counts['received'] < 201
     assert counts['received'] + counts['dropped'] == 201
@@ -91,7 +91,7 @@ def test_a_speed_without_an_answer_is_answered_with_nan(bench, speed):
         assert stamp_ns(message) == STAMP
         for name in ('position', 'velocity', 'effort'):
             assert np.isnan(getattr(message, name)).all()
-    assert node._watches[0].monitor.health.counts['answered'] == 0
+    assert node._watches['fan'].monitor.health.counts['answered'] == 0
 
 
 def test_a_message_without_the_rotor_is_counted_and_ignored(bench):
@@ -102,7 +102,7 @@ def test_a_message_without_the_rotor_is_counted_and_ignored(bench):
     publish(joint_state([], names=['main_shaft']))
     publish(joint_state([400.0], names=['main_shaft'], stamp=STAMP + 5))
     bench.graph.until(lambda: len(amplitude) == 2, 'the answers')
-    counts = node._watches[0].monitor.health.counts
+    counts = node._watches['fan'].monitor.health.counts
     assert (counts['joint_missing'], counts['velocity_missing'], counts['nan']) == (1, 1, 1)
     assert np.isnan(amplitude[0].position).all()
     assert stamp_ns(amplitude[1]) == STAMP + 5
@@ -153,8 +153,8 @@ def test_the_unbalance_of_the_case_reaches_the_table_to_the_last_bit(bench, tmp_
     case.write_text(Path(bench.case_file).read_text().replace(
         'unbalances:', 'unbalances:\n  - {disc: disc_2, moment: 1.1e-5, phase: 0.2}'))
     node = bench.active('fan', fan__case=str(case))
-    expected = load(case).unbalance
-    assert node.settings.unbalance('fan', ('disc_1', 'disc_2')).tobytes() == expected.tobytes()
+    fan = Machine.load(case, cache_directory=bench.cache)
+    assert node.settings.unbalance('fan', fan).tobytes() == fan.case.unbalance.tobytes()
 
 
 def test_the_log_reaches_the_disk_every_second(bench, tmp_path):
@@ -220,7 +220,7 @@ def test_life_cycle_services_configure_silence_and_release(bench):
     publish(joint_state([300.0], stamp=STAMP + 2))
     bench.graph.until(lambda: len(amplitude) == 2, 'the answer after the silence')
     assert stamp_ns(amplitude[1]) == STAMP + 2
-    assert node._watches[0].monitor.health.counts['received'] == 2
+    assert node._watches['fan'].monitor.health.counts['received'] == 2
     assert bench.change(Transition.TRANSITION_DEACTIVATE)
     assert bench.change(Transition.TRANSITION_CLEANUP)
     assert bench.state() == 'unconfigured'

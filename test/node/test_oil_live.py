@@ -30,7 +30,7 @@ def test_answers_follow_the_oil(graph, oiled):
     message = Temperature(temperature=78.0)
     message.header.stamp.sec = STAMP // 10**9
     warm.publish(message)
-    monitor = bench.graph.nodes[1]._watches[0].monitor
+    monitor = bench.graph.nodes[1]._watches['fan'].monitor
     bench.graph.until(lambda: monitor.table is monitor._oils.tables.get(80.0), 'the warm table')
     publish(joint_state([250.0], stamp=STAMP + 5))
     bench.graph.until(lambda: len(amplitude) == 2, 'the second answer')

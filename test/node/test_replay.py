@@ -218,7 +218,7 @@ def test_sensors_are_heard_from_their_first_sample_on(graph, tmp_path, cache, mo
             Parameter(name, value=value) for name, value in parameters.items()]))
     assert node.start()
     replaying = InThread(replay, source, rate=4.0, wait_s=DEADLINE_S, context=graph.context)
-    counts = node._watches[0].monitor.health.counts
+    counts = node._watches['fan'].monitor.health.counts
     graph.until(lambda: replaying.is_done() and counts['samples'] == 8000, 'every sample')
     node.release()
     wanted, found = topics_of(source), topics_of(tmp_path / 'run')

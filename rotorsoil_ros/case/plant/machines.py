@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
 import math
 from pathlib import Path
@@ -76,10 +76,10 @@ class PlantEntries:
             wrong += told.found
             if case is not None:
                 cases.append(case)
-        source = self._source()
+        source = self._source() if self.sources else None
         if isinstance(source, InputError):
             wrong.append(source)
-        if wrong or isinstance(source, InputError):
+        if wrong or not isinstance(source, int):
             # What all stand on is told once.
             return None, list({str(error): error for error in wrong}.values())
         told = Faults(self.path, self._document(source, sensors=self.entries.sensors))
@@ -93,10 +93,10 @@ class PlantEntries:
         if source is None:
             return self._error('source', problem=(
                 'is missing: which machine shakes the others, one of '
-                f'{", ".join(sources)} (--set source={next(iter(sources), "NAME")})'))
+                f'{", ".join(sources)} (--set source={sources[0]})'))
         if source not in sources:
             return self._error('source', problem=(
-                f'must be a machine that turns, one of {", ".join(sources) or "none"}, got '
+                f'must be a machine that turns, one of {", ".join(sources)}, got '
                 f'{source}' + (', which is idle' if source in self.names else '')))
         return self.names.index(source)
 
@@ -192,9 +192,10 @@ class PlantEntries:
     def _own_faults(self) -> list[InputError]:
         """Return what is wrong with the machines among each other."""
         found: list[InputError] = []
-        if not self.names:
-            found.append(self._error('machines', problem='must name at least one machine, got '
-                                                         'none'))
+        if not self.sources:
+            found.append(self._error('machines', problem=(
+                'must name at least one machine that turns, got '
+                + (f'{", ".join(self.names)}, idle all of them' if self.names else 'none'))))
         blocks = [block.name for block in self.entries.foundations]
         for index, machine in enumerate(self.entries.machines):
             found += [self._error('machines', index, *filter(None, key.split('.')),
@@ -338,7 +339,7 @@ def _rotor(
         if name not in files:
             document.read(file)  # says what is wrong with it as a file
             files[name] = file.read_text(encoding='utf-8')
-        content = document.parse(files[name], source=str(file))
+        content = _parsed(files[name], source=str(file))
     except InputError as error:
         return None, [error]
     if not isinstance(content, dict) or not isinstance(content.get('rotor'), dict):
@@ -347,6 +348,10 @@ def _rotor(
     rotor, wrong = validated(PlantRotor, file, content['rotor'])
     # A key of that file is none of this one.
     return rotor, [InputError(str(error)) for error in wrong]
+
+
+# Read and never changed: where a plant is at fault it is tried in hundreds of ways.
+_parsed = lru_cache(maxsize=16)(document.parse)
 
 
 def written_out(machine: Mapping[str, Any], files: Mapping[str, str]) -> Mapping[str, Any]:

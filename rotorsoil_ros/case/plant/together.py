@@ -69,6 +69,11 @@ class Shaken:
         return to_mm_s_rms(math.sqrt(2.0) * self.velocity_rms)
 
     @property
+    def own_rms(self) -> FloatArray:
+        """Part of each source by itself, (m, c) [m/s rms, rad/s rms]."""
+        return np.asarray(self._velocity / math.sqrt(2.0))
+
+    @property
     def highest(self) -> FloatArray:
         """Displacement that all parts reach where their peaks meet, (c,) [m, rad]."""
         return np.asarray(np.abs(self.displacement).sum(axis=0))
@@ -195,16 +200,21 @@ class Plant:
                       np.array(parts))
 
 
-def plants_of(machines: Mapping[str, Machine]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield every plant of which several machines are answered, with the names of these."""
-    plants: dict[tuple[str, tuple[Channel, ...]], list[str]] = {}
+def plants_of(machines: Mapping[str, Machine]) -> dict[str, dict[str, Machine]]:
+    """
+    Return the machines of every plant, by its name.
+
+    That is what comes before the slash in `<plant>/<machine>`, or else what the case calls it;
+    one machine alone under a name of its own is no plant.
+    """
+    whole, loose = dict[str, dict[str, Machine]](), dict[str, dict[str, Machine]]()
     for name, machine in machines.items():
-        berth = machine.case.berth
-        if berth is not None:
-            plants.setdefault((berth.plant, machine.table.channels), []).append(name)
-    for (plant, _), names in plants.items():
-        if len(names) > 1:
-            yield plant, tuple(names)
+        berth, plant = machine.case.berth, name.rpartition('/')[0]
+        if plant:
+            whole.setdefault(plant, {})[name] = machine
+        elif berth is not None:
+            loose.setdefault(berth.plant, {})[name] = machine
+    return whole | {plant: among for plant, among in loose.items() if len(among) > 1}
 
 
 def sources_of(path: Path, overrides: Sequence[str] = ()) -> tuple[str, ...]:
