@@ -208,7 +208,7 @@ def test_geared_machine_runs_and_is_looked_at_in_proportion(tmp_path):
     (['source=fan_3'], 'source: must be a machine that turns, one of fan_1, fan_2, got fan_3'),
     (['source=fan_2', 'machines.1.idle=true', 'machines.1.rated_rpm=null'],
      'source: must be a machine that turns, one of fan_1, got fan_2, which is idle'),
-    (['machines=[]'], 'machines: must name at least one machine, got none'),
+    (['machines=[]'], 'machines: must name at least one machine that turns, got none'),
     (['machines.0.place=null'], 'machines.0.place: must hold keys and values, got None'),
     (['machines.1.place={x: 1.0}'], 'machines.1.place.y: is missing'),
     (['machines.1.name=fan_1'],
