@@ -44,12 +44,15 @@ def place_of(error: InputError) -> Place:
     return error.place if isinstance(error, CaseError) else ()
 
 
-def validated(kind: type[M], path: Path, content: object) -> tuple[M | None, list[InputError]]:
-    """Return what a document says as entries, or all that is wrong with their form."""
+def validated(
+    kind: type[M], path: Path, content: object, *, under: Place = (),
+) -> tuple[M | None, list[InputError]]:
+    """Return what is said at a key as entries, or all that is wrong with their form."""
     try:
         return kind.model_validate(content), []
     except ValidationError as error:
-        return None, [CaseError(path, place, problem) for place, problem in faults(error)]
+        return None, [CaseError(path, (*under, *place), problem)
+                      for place, problem in faults(error)]
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ class Faults:
         Faults that were met so far, a line each.
     under : tuple
         Place of the machine in the file of a plant, below which its own keys stand.
+    rotor_file : Path or None
+        The file that describes its rotor, where that is another one.
 
     """
 
@@ -74,6 +79,7 @@ class Faults:
     entries: schema.Document
     found: list[InputError] = field(default_factory=list)
     under: Place = ()
+    rotor_file: Path | None = None
 
     def attempt(self, build: Callable[[], T]) -> T | None:
         """Return what is built, or keep what is wrong with it for later, and return None."""
@@ -110,8 +116,11 @@ class Faults:
                 problem = problem.removeprefix(f'{found[1]} ')
             raise self.error(*place, problem=problem) from error
 
-    def error(self, *place: int | str, problem: str) -> CaseError:
+    def error(self, *place: int | str, problem: str) -> InputError:
         """Return the error to raise at a key."""
+        if self.rotor_file is not None and place[:1] == ('rotor',):
+            # A key of that file is none of this one.
+            return InputError(message(self.rotor_file, place, problem))
         if place and place[0] in _OF_MACHINE:
             place = (*self.under, *place)
         return CaseError(self.path, place, problem)

@@ -5,7 +5,7 @@ from functools import cache, partial
 import math
 import re
 import tokenize
-from typing import Annotated, TYPE_CHECKING
+from typing import Annotated, TYPE_CHECKING, TypeGuard
 
 from pydantic import BeforeValidator
 
@@ -90,8 +90,13 @@ def _spelled(unit: str) -> str:
     return unit.replace(' ', '*') or 'dimensionless'
 
 
+def is_name(value: object) -> TypeGuard[str]:
+    """Return whether something may be called so."""
+    return isinstance(value, str) and _NAME.fullmatch(value) is not None
+
+
 def _name(value: object) -> str:
-    if not isinstance(value, str) or not _NAME.fullmatch(value):
+    if not is_name(value):
         raise ValueError('must be a name of at most 64 small letters, digits and _, first a '
                          f'letter, got {shown(value)}')
     return value

@@ -25,6 +25,7 @@ _WHAT = {
     'dict_type': 'must hold keys and values, got {input}',
     'list_type': 'must be a list, got {input}',
     'tuple_type': 'must be a list, got {input}',
+    'bool_type': 'must be true or false, got {input}',
     'too_long': 'has more entries than it should: {input}',
     'literal_error': 'must be {expected}, got {input}',
 }

@@ -284,12 +284,8 @@ class FlexibleEntries:
         y = float(mean[1]) if y is None else y
         for number, gap in seats:
             bearing = self.faults.entries.rotor.bearings[number]
-            off = np.where(np.isfinite(gap), gap - np.array([x, y, 0.0]), 0.0)
-            if np.linalg.norm(off) > _OFF_SHAFT:
-                raise self.faults.error('rotor', 'bearings', number, 'seat', problem=(
-                    f'{bearing.seat or bearing.name} must be on the shaft within '
-                    f'{_OFF_SHAFT:g} m, got {off[0]:.4g} m across, {off[1]:.4g} m along and '
-                    f'{off[2]:.4g} m up from the seat to the bearing {bearing.name}'))
+            with self.faults.at('rotor', 'bearings', number, entry=bearing):
+                require_on_shaft(bearing.seat or bearing.name, gap - np.array([x, y, 0.0]))
         return x, y
 
     def _seats(
@@ -311,6 +307,15 @@ class FlexibleEntries:
             found.append((number, np.array(here) - (np.array(body.dofs[seat].place)
                                                     - body.centre)))
         return found
+
+
+def require_on_shaft(seat: str, gap: FloatArray) -> None:
+    """Raise a RotorSoilError where the way (3,) from a seat to its bearing [m] is long."""
+    across, along, up = np.where(np.isfinite(gap), gap.round(4) + 0.0, 0.0).tolist()
+    if math.hypot(across, along, up) > _OFF_SHAFT:
+        raise RotorSoilError(
+            f'seat must be on the shaft within {_OFF_SHAFT:g} m, got {across:g} m across, '
+            f'{along:g} m along and {up:g} m up from {seat} to the bearing')
 
 
 def _drawn_height(body: FlexibleBody) -> float | None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.flexible.entries import require_on_shaft
 from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.flexible.part import Mount
 from rotorsoil_ros.machine.foundation import Foundation
@@ -174,3 +176,19 @@ def mounts(case: 'Case') -> list[Mount]:
     """Return where the bearings of all its rotors are."""
     return [Mount(bearing, rotor.shaft_height, place)
             for _, rotor, place in placed(case) for bearing in rotor.bearings]
+
+
+def refuse_seats_elsewhere(
+    faults: Faults, rotor: Rotor, place: Placement, foundations: Sequence[Foundation],
+) -> None:
+    """Raise an InputError at a bearing whose seat on what bends is not below it."""
+    blocks = {block.name: block for block in foundations}
+    for number, bearing in enumerate(rotor.bearings):
+        block = blocks.get(bearing.foundation or '')
+        if block is None or block.body is None:
+            continue
+        mount, body = Mount(bearing, rotor.shaft_height, place), block.body
+        with faults.at('rotor', 'bearings', number, entry=faults.entries.rotor.bearings[number]):
+            seat = body.dofs[int(np.flatnonzero(mount.on(body)[1])[0])]
+            below = np.array(seat.place) - body.centre + [block.centre_x, block.centre_y, 0.0]
+            require_on_shaft(seat.station, np.array(mount.point) - below)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import combinations
 import math
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any, TYPE_CHECKING, TypeAlias
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.case_errors import CaseError, Faults, validated
 from rotorsoil_ros.case.entries.sensors import sensors_of
-from rotorsoil_ros.case.plant.berth import Berth, renamed
+from rotorsoil_ros.case.plant.berth import Berth, refuse_seats_elsewhere, renamed
 from rotorsoil_ros.case.plant.entries import (
     MachineEntry,
     PlantDocument,
@@ -71,7 +71,7 @@ class PlantEntries:
         """Return the machine that `source` names, or what is wrong with any of them."""
         wrong, cases = self._own_faults(), list['Case']()
         for index in range(len(self.names) if not wrong else 0):
-            told = Faults(self.path, self._document(index), under=('machines', index))
+            told = self._faults(index)
             case = build(told)
             wrong += told.found
             if case is not None:
@@ -118,6 +118,11 @@ class PlantEntries:
             tuple(fastest[:index] + fastest[index + 1:]),
             tuple(self._remarks(index, own.foundations, places[index])),
             None if ratio is None else (ratio.of, ratio.times))
+        for number, (rotor, place) in enumerate(zip(rotors, places, strict=True)):
+            faults.attempt(partial(refuse_seats_elsewhere, self._faults(number), rotor, place,
+                                   own.foundations))
+        if faults.found:
+            return None
         couples = tuple(f'{name}_{disc}' for disc in own.couples)
         with faults.at('machines'):
             model = berth.model(rotors[index], own.foundations,
@@ -167,6 +172,12 @@ class PlantEntries:
             'unbalances': machine.unbalances, 'speed_range_rpm': self._speed_range(index),
             'sensors': sensors or SensorsEntry()})
 
+    def _faults(self, index: int) -> Faults:
+        rotor = self.entries.machines[index].rotor
+        return Faults(
+            self.path, self._document(index), under=('machines', index), rotor_file=(
+                self.path.parent / rotor.file if isinstance(rotor, RotorOfFile) else None))
+
     def _rated(self, index: int) -> float:
         """Return the speed at which a machine runs while another is looked at [rpm]."""
         machine = self.entries.machines[index]
@@ -181,9 +192,7 @@ class PlantEntries:
         if machine.ratio is not None:
             low, high = self._speed_range(self.names.index(machine.ratio.of))
             return machine.ratio.times * low, machine.ratio.times * high
-        if self.entries.speed_range_rpm is None:
-            raise self._error('machines', index, 'speed_range_rpm', problem=(
-                'is missing, and so is speed_range_rpm of all machines'))
+        assert self.entries.speed_range_rpm is not None
         return self.entries.speed_range_rpm
 
     def _error(self, *place: int | str, problem: str) -> CaseError:
@@ -196,6 +205,11 @@ class PlantEntries:
             found.append(self._error('machines', problem=(
                 'must name at least one machine that turns, got '
                 + (f'{", ".join(self.names)}, idle all of them' if self.names else 'none'))))
+        without = [machine.name for machine in self.entries.machines
+                   if machine.speed_range_rpm is None and machine.ratio is None]
+        if without and self.entries.speed_range_rpm is None:
+            found.append(self._error('speed_range_rpm', problem=(
+                f'is missing, and {", ".join(without)} say none of their own')))
         blocks = [block.name for block in self.entries.foundations]
         for index, machine in enumerate(self.entries.machines):
             found += [self._error('machines', index, *filter(None, key.split('.')),
@@ -264,7 +278,10 @@ class PlantEntries:
                 return [] if len(passed) > 1 else [(
                     'ratio.of', f'must be one of {", ".join(self.names)}, got {of}')]
             if of in passed:
-                return [('ratio.of', f'goes round in a circle: {" of ".join([*passed, of])}')]
+                # Told once, at the first of those that make it up.
+                circle = passed[passed.index(of):]
+                return [] if machine.name != min(circle, key=self.names.index) else [(
+                    'ratio.of', f'goes round in a circle: {" of ".join([*circle, of])}')]
             passed.append(of)
         if passed[-1] not in self.sources:
             return [('ratio.of', f'must be a machine that turns, got {passed[-1]}, which is idle')]
@@ -288,10 +305,11 @@ class PlantEntries:
     def _refuse_rated_beyond(self, index: int) -> None:
         """Raise an InputError for a rated speed at which the machine is not looked at."""
         (low, high), rated = self._speed_range(index), self._rated(index)
-        if not self.entries.machines[index].idle and low < high and not low <= rated <= high:
-            raise self._error('machines', index, 'rated_rpm', problem=(
-                f'must lie in the speed range of the machine, {low:g} to {high:g} rpm, got '
-                f'{rated:g}'))
+        machine = self.entries.machines[index]
+        if not machine.idle and 0.0 <= low < high and not low <= rated <= high:
+            raise self._error('machines', index, 'ratio' if machine.ratio else 'rated_rpm',
+                              problem=('must lie in the speed range of the machine, '
+                                       f'{low:g} to {high:g} rpm, got {rated:g}'))
 
 
 def case_among(
@@ -345,7 +363,7 @@ def _rotor(
     if not isinstance(content, dict) or not isinstance(content.get('rotor'), dict):
         return None, [CaseError(path, ('machines', index, 'rotor', 'file'), (
             f'must be the case file of a machine with its rotor, got {name}'))]
-    rotor, wrong = validated(PlantRotor, file, content['rotor'])
+    rotor, wrong = validated(PlantRotor, file, content['rotor'], under=('rotor',))
     # A key of that file is none of this one.
     return rotor, [InputError(str(error)) for error in wrong]
 

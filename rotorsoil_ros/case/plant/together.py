@@ -11,9 +11,8 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case import document
-from rotorsoil_ros.case.case_errors import validated
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.case.plant.entries import PlantDocument
+from rotorsoil_ros.case.quantities import is_name
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.prediction import columns_of
@@ -228,7 +227,8 @@ def sources_of(path: Path, overrides: Sequence[str] = ()) -> tuple[str, ...]:
     document.override(content, [*own, *overrides])
     if 'machines' not in content or content.get('source') is not None:
         return ()
-    entries, _ = validated(PlantDocument, path, content)
-    # What is wrong with a file is told where one of its machines is read.
-    return ('',) if entries is None else tuple(
-        machine.name for machine in entries.machines if not machine.idle)
+    machines = content['machines']
+    named = [machine for machine in (machines if isinstance(machines, list) else [])
+             if isinstance(machine, dict) and is_name(machine.get('name'))]
+    # What else is wrong with a file is told where one of its machines is read.
+    return tuple(machine['name'] for machine in named if machine.get('idle') is not True) or ('',)

@@ -48,6 +48,12 @@ class Mount:
         """Directions x and z of the machine in the axes of the ground, (2, 3)."""
         return self.place.axes[[0, 2]]
 
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """Where it is in the axes of the ground, above the contact [m]."""
+        rises = self.bearing.position if self.place.is_upright else 0.0
+        return *self.place.point(self.bearing.position), self.height + rises
+
     def on(self, body: FlexibleBody) -> FloatArray:
         """
         Return its x and z per motion of the interface of what it stands on, (2, p).

@@ -41,6 +41,14 @@ FRAME = {
                            for number in (1, 2, 3, 4)]},
     'speed_range_rpm': [100, 1200]}
 
+FANS = {
+    **{key: value for key, value in FAN.items() if key not in ('rotor', 'unbalances')},
+    'name': 'fans', 'source': 'fan_1', 'machines': [{
+        'name': f'fan_{number}', 'place': {'x': x, 'y': -0.75}, 'rated_rpm': 1480,
+        'rotor': {**FAN['rotor'], 'bearings': [
+            {**one, 'name': f'b{end}'} for end, one in enumerate(FAN['rotor']['bearings'], 1)]},
+        'unbalances': FAN['unbalances']} for number, x in ((1, -3.0), (2, 3.0))]}
+
 
 def table(path, springs):
     """Write springs and dashpots as a file of the support model `table`."""
@@ -65,7 +73,7 @@ def folder(tmp_path_factory):
         shutil.copy(file, folder)
     table(folder / 'footing.csv', FOOTING)
     table(folder / 'patch.csv', PATCH)
-    for name, content in (('fan', FAN), ('frame', FRAME)):
+    for name, content in (('fan', FAN), ('frame', FRAME), ('fans', FANS)):
         (folder / f'{name}.yaml').write_text(yaml.safe_dump(content))
     return folder
 
@@ -149,9 +157,13 @@ def test_a_body_out_of_a_log_needs_no_file(folder, tmp_path):
      'rotor.bearings.0.seat: must be one that moves along x, fan_1_b1, fan_1_b2, fan_2_b1, '
      'fan_2_b2, got nowhere'),
     ('fan', ['rotor.shaft_height=2.1'],
-     'rotor.bearings.0.seat: fan_1_b1 must be on the shaft within 0.02 m, got 0 m across, 0 m '
-     'along and 0.1 m up from the seat to the bearing fan_1_b1'),
-    ('fan', ['rotor.bearings.1.position=1.35'], 'rotor.bearings.0.seat: fan_1_b1 must be on the'),
+     'rotor.bearings.0.seat: must be on the shaft within 0.02 m, got 0 m across, 0 m along and '
+     '0.1 m up from fan_1_b1 to the bearing'),
+    ('fan', ['rotor.bearings.1.position=1.35'], 'rotor.bearings.0.seat: must be on the shaft'),
+    ('fans', ['machines.1.place.x=2.9'], 'machines.1.rotor.bearings.0.seat: must be on the shaft '
+     'within 0.02 m, got -0.1 m across, 0 m along and 0 m up from fan_2_b1 to the bearing'),
+    ('fans', ['machines.1.rotor.bearings.0.seat=nowhere'],
+     'machines.1.rotor.bearings.0.seat: must be one that moves along x, fan_1_b1'),
     ('fan', ['foundations.0.mass=1000'],
      'foundations.0.mass: belongs to a rigid block; flexible brings its own'),
     ('fan', ['foundations.0.flexible.modes=raft_rigid.csv'],

@@ -209,6 +209,10 @@ def test_geared_machine_runs_and_is_looked_at_in_proportion(tmp_path):
     (['source=fan_2', 'machines.1.idle=true', 'machines.1.rated_rpm=null'],
      'source: must be a machine that turns, one of fan_1, got fan_2, which is idle'),
     (['machines=[]'], 'machines: must name at least one machine that turns, got none'),
+    ([f'machines.{index}={{name: fan_{index}, place: {{x: {index}, y: 0, z: 2}}, idle: true, '
+      'rotor: {file: plant_fan.yaml}}' for index in (0, 1)],
+     'machines: must name at least one machine that turns, got fan_0, fan_1, idle all of them'),
+    (['machines.0.idle=1'], 'machines.0.idle: must be true or false, got 1'),
     (['machines.0.place=null'], 'machines.0.place: must hold keys and values, got None'),
     (['machines.1.place={x: 1.0}'], 'machines.1.place.y: is missing'),
     (['machines.1.name=fan_1'],
@@ -231,6 +235,12 @@ def test_geared_machine_runs_and_is_looked_at_in_proportion(tmp_path):
      'machines.1.ratio.of: must be one of fan_1, fan_2, got motor'),
     (['machines.1.rated_rpm=null', 'machines.1.ratio={of: fan_2, times: 2}'],
      'machines.1.ratio.of: goes round in a circle: fan_2 of fan_2'),
+    (['machines.0.rated_rpm=null', 'machines.0.ratio={of: fan_2, times: 2}',
+      'machines.1.rated_rpm=null', 'machines.1.ratio={of: fan_1, times: 2}'],
+     'machines.0.ratio.of: goes round in a circle: fan_1 of fan_2 of fan_1'),
+    (['machines.1.rated_rpm=null', 'machines.1.ratio={of: fan_1, times: 2}',
+      'machines.1.speed_range_rpm=[100, 1800]'],
+     'machines.1.ratio: must lie in the speed range of the machine, 100 to 1800 rpm, got 2960'),
     (['machines.1.rated_rpm=null', 'machines.1.ratio={of: fan_1, times: -2}'],
      'machines.1.ratio.times: must be > 0 (a shaft that turns the other way has heading 180 '
      'deg), got -2'),
@@ -243,8 +253,10 @@ def test_geared_machine_runs_and_is_looked_at_in_proportion(tmp_path):
     (['machines.0.rotor={file: plant_fan.yaml, probes: []}'],
      'machines.0.rotor.probes: is not a known key; known here: file'),
     (['rotor={}', 'source=fan_1'], None),
-    (['speed_range_rpm=null'], 'machines.0.speed_range_rpm: is missing, and so is '
-     'speed_range_rpm of all machines'),
+    (['speed_range_rpm=null'],
+     'speed_range_rpm: is missing, and fan_1, fan_2 say none of their own'),
+    (['machines.0.speed_range_rpm=[-5, 5]'],
+     'machines.0.speed_range_rpm: must be two rising speeds >= 0 rpm, got [-5, 5]'),
     (['sensors={channels: {fan_1_drive_end_housing_q: {range: 20}}}', 'source=fan_1'],
      'sensors.channels.fan_1_drive_end_housing_q: is not a channel of this machine; did you mean '
      'fan_1_drive_end_housing_z?'),
@@ -255,7 +267,30 @@ def test_what_is_wrong_with_a_plant_is_one_clear_line(settings, line):
         assert len(found) == 1
         assert 'nobody.yaml: cannot be read' in found[0] or found[0].startswith('rotor: ')
     else:
-        assert line in found
+        # Which machine is meant is a fault of its own, where nothing says it.
+        assert [told for told in found if told == line or not told.startswith('source: is')] == [
+            line]
+
+
+def test_check_of_all_machines_does_not_ask_for_one(tmp_path, capsys, cache):
+    def wrong(content):
+        content['machines'][0]['rated_rpm'] = 'fast'
+
+    path = written(tmp_path, wrong)
+    assert main(['check', str(path), '--cache', str(cache)]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"{path}: machines.0.rated_rpm: must be a finite number in rpm, got 'fast'"]
+
+
+def test_fault_of_a_rotor_is_told_once_and_of_its_own_file(tmp_path):
+    path = written(tmp_path)
+    rotor = tmp_path / 'plant_fan.yaml'
+    rotor.write_text(FAN.read_text().replace('mass: 320.0', 'mass: -3'))
+    assert faults(path, 'source=fan_1') == [
+        f'{rotor}: rotor.discs.1.mass: must be >= 0 kg and finite, got -3']
+    rotor.write_text(FAN.read_text().replace('mass: 320.0', 'mass: heavy'))
+    assert faults(path, 'source=fan_1') == [
+        f"{rotor}: rotor.discs.1.mass: must be a finite number in kg, got 'heavy'"]
 
 
 def test_all_machines_are_told_what_is_wrong_with_them_at_once(tmp_path):
