@@ -10,7 +10,7 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.flexible.entries import require_on_shaft
-from rotorsoil_ros.ground.soil import SoilModel
+from rotorsoil_ros.ground.soil import extents, SoilModel
 from rotorsoil_ros.machine.flexible.part import Mount
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import Placement
@@ -176,6 +176,13 @@ def mounts(case: 'Case') -> list[Mount]:
     """Return where the bearings of all its rotors are."""
     return [Mount(bearing, rotor.shaft_height, place)
             for _, rotor, place in placed(case) for bearing in rotor.bearings]
+
+
+def beside(block: Foundation, point: tuple[float, float]) -> float:
+    """Return how far a point in plan lies outside a block [m]; below 0 inside."""
+    (left, right), (front, back) = extents(block.contact)
+    x, y = point[0] - block.centre_x, point[1] - block.centre_y
+    return max(left - x, x - right, front - y, y - back)
 
 
 def refuse_seats_elsewhere(

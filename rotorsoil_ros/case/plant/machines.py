@@ -11,7 +11,7 @@ from typing import Any, TYPE_CHECKING, TypeAlias
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.case_errors import CaseError, Faults, validated
 from rotorsoil_ros.case.entries.sensors import sensors_of
-from rotorsoil_ros.case.plant.berth import Berth, refuse_seats_elsewhere, renamed
+from rotorsoil_ros.case.plant.berth import Berth, beside, refuse_seats_elsewhere, renamed
 from rotorsoil_ros.case.plant.entries import (
     MachineEntry,
     PlantDocument,
@@ -21,7 +21,7 @@ from rotorsoil_ros.case.plant.entries import (
 from rotorsoil_ros.case.schema import Document, FoundationEntry, SensorsEntry
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.ground.soil import extents, RigidSoil
+from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.neighbour import Neighbour
@@ -150,10 +150,10 @@ class PlantEntries:
             block = blocks.get(bearing.foundation or '', foundations[0] if foundations else None)
             if block is None or (bearing.foundation is None and len(foundations) > 1):
                 continue
-            beside = _beside(block, place.point(bearing.position))
-            if beside > 0.0:
+            outside = beside(block, place.point(bearing.position))
+            if outside > 0.0:
                 yield (f'machines.{index}.place: {bearing.name} of {machine.name} stands '
-                       f'{beside:.4g} m beside {block.name}; a place is in m')
+                       f'{outside:.4g} m beside {block.name}; a place is in m')
 
     def _document(self, index: int, *, sensors: SensorsEntry | None = None) -> Document:
         """Return what the file says of one machine and of all that it stands on."""
@@ -383,13 +383,6 @@ def written_out(machine: Mapping[str, Any], files: Mapping[str, str]) -> Mapping
             bearing.pop('foundation', None)
     return {key: value for key, value in own.items()
             if key != 'shaft_height' or machine['place'].get('z') is None}
-
-
-def _beside(block: Foundation, point: tuple[float, float]) -> float:
-    """Return how far a point in plan lies outside a block [m]; below 0 inside."""
-    (left, right), (front, back) = extents(block.contact)
-    x, y = point[0] - block.centre_x, point[1] - block.centre_y
-    return max(left - x, x - right, front - y, y - back)
 
 
 def _place(machine: MachineEntry, rotor: Rotor) -> Placement:
