@@ -1,5 +1,6 @@
 """What the documents and examples say of the node is what the node has."""
 
+import gc
 from pathlib import Path
 import re
 
@@ -18,6 +19,7 @@ NOT_ALWAYS = {'/clock', '/fan/measured/disc_1_x/imu', '/fan/oil_temperature'}
 
 
 def test_the_security_policy_is_exactly_for_what_the_node_has(bench: Bench):
+    gc.collect()  # a node of the same name is in the graph until its context is collected
     node = bench.active('fan')
     policy = re.search(r'<policy.*</policy>', (ROOT / 'docs' / 'security.md').read_text(),
                        re.DOTALL)[0]
