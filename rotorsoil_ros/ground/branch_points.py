@@ -1,6 +1,7 @@
 """At which frequencies waves of a layer begin to travel, as a table of compliances shows it."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,13 +50,25 @@ def branch_points(omega: FloatArray, values: ComplexArray) -> FloatArray:
     pole in its place.
 
     """
+    shape = values.shape
+    return np.array(_branch_points(
+        omega.astype(float).tobytes(), values.astype(complex).tobytes(), shape[:2]))
+
+
+@lru_cache(maxsize=8)
+def _branch_points(
+    of_omega: bytes, of_values: bytes, shape: tuple[int, int],
+) -> tuple[float, ...]:
+    """Find them; a case at fault is built again and again, with the same table."""
+    omega = np.frombuffer(of_omega)
+    values = np.frombuffer(of_values, dtype=complex).reshape(*shape, shape[1])
     size = np.sqrt(np.abs(np.einsum('kii->ki', values)).max(axis=0))
     unit = np.where(size > 0.0, size, 1.0)
     entries = (values / (unit[:, None] * unit)).reshape(len(omega), -1)
     search = _Search(omega, entries[:, np.abs(entries).max(axis=0) > 1e-9])
     first = omega[0] if omega[0] > 0.0 else omega[1]
     if len(omega) < _ROWS or not search.entries.size:
-        return np.zeros(0)
+        return ()
     places = np.geomspace(first, omega[-1], _PLACES)
     score = np.array([search.score(place) for place in places])
     # A light layer shows between two places only: what sticks out is looked at more closely.
@@ -66,7 +79,7 @@ def branch_points(omega: FloatArray, values: ComplexArray) -> FloatArray:
     for place, gain in sorted(closer, key=lambda one: -one[1]):
         if gain > 1.0 and all(abs(place / other - 1.0) > _SAME for other in found):
             found.append(place)
-    return np.sort(found)
+    return tuple(sorted(found))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,19 +10,16 @@ from typing import Any
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
-from rotorsoil_ros.case import schema, stiffness_file
+from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.case_errors import Faults
-from rotorsoil_ros.case.flexible import matrices, tables
-from rotorsoil_ros.case.flexible.interface import Interface
+from rotorsoil_ros.case.flexible.files import Loss, of_matrices, of_modes
 from rotorsoil_ros.channel import ACROSS, DOFS
-from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
 from rotorsoil_ros.machine.flexible.body import CONTACT, EACH, FlexibleBody, PROBE
-from rotorsoil_ros.machine.flexible.reduction import FiniteElements
 from rotorsoil_ros.machine.flexible.rigidity import ABOVE_EXCITATION
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz
+from rotorsoil_ros.units import rad_s_to_hz
 
 # Modes have to reach so many times the highest 1X frequency.
 LEAST_REACH, GOOD_REACH = 2.0, 3.0
@@ -101,8 +98,7 @@ class FlexibleEntries:
             body = FlexibleBody.from_plain(plain)
         else:
             with self.faults.at('foundations', index, 'flexible', entry=entry):
-                body = (self._of_modes(index, entry) if by_modes
-                        else self._of_matrices(index, entry, highest))
+                body = self._of_files(entry, highest)
             self.cache.store('flexible', key, {'body': np.array(json.dumps(body.to_plain()))})
         self.files[told] = json.dumps({'asked': asked, 'body': body.to_plain()})
         return body
@@ -136,79 +132,23 @@ class FlexibleEntries:
     def _path(self, file: str) -> Path:
         return self.faults.path.parent / file
 
-    def _loss(self, entry: schema.FlexibleEntry, count: int) -> tuple[FloatArray, float]:
-        """Return the loss factor of each mode, and of the rest."""
-        given = entry.damping_ratios
-        if given is None:
-            assert entry.loss_factor is not None
-            loss: FloatArray = np.full(count, entry.loss_factor)
-        else:
-            ratios = np.array(given, dtype=float)
-            if ratios.ndim and len(ratios) != count:
-                raise RotorSoilError(f'damping_ratios must be one number or {count}, one for each '
-                                     f'mode, got {len(ratios)}')
-            loss = 2.0 * np.broadcast_to(ratios, count)
-        if not (np.all(loss >= 0.0) and np.all(loss < 1.0)):
-            raise RotorSoilError(f'loss_factor must be in [0, 1), got {loss.max():g}')
-        return loss.copy(), float(loss.mean()) if count else 0.0
+    def _of_files(self, entry: schema.FlexibleEntry, highest: float) -> FlexibleBody:
+        def at(file: str | None) -> Path | None:
+            return None if file is None else self._path(file)
 
-    def _of_modes(self, index: int, entry: schema.FlexibleEntry) -> FlexibleBody:
-        assert entry.modes is not None
-        assert entry.residual is not None
-        assert entry.rigid is not None
-        at = self._path(entry.modes)
-        if at.suffix.lower() in ('.unv', '.uff'):
-            from rotorsoil_ros.case.flexible.universal import modes as universal
-
-            names, frequency, shapes = universal(at)
-        else:
-            matrices.refuse_foreign(at)
-            names, frequency, shapes = tables.modes(at, stiffness_file.text_of(at))
-        rigid = self._numbers(entry.rigid, 6)
-        if len(rigid) != 6 + len(names):
-            raise InputError(f'{self._path(entry.rigid)}: must have six rows of mass and '
-                             f'{len(names)} of rigid motion, those of {at.name}, got {len(rigid)}')
-        residual = self._numbers(entry.residual, len(names))
-        if len(residual) != len(names):
-            raise InputError(f'{self._path(entry.residual)}: must have {len(names)} rows, those '
-                             f'of {at.name}, got {len(residual)}')
-        dofs = tables.dofs_of(at, names, rigid[6:])
-        if entry.dofs is not None:
-            where = self._path(entry.dofs)
-            known = {f'{row.dof.station}_{row.dof.axis}': row.dof
-                     for row in tables.motions(where, stiffness_file.text_of(where))}
-            missing = next((name for name in names if name not in known), None)
-            if missing is not None:
-                raise InputError(f'{where}: has no {missing}, which {at.name} has')
-            dofs = [known[name] for name in names]
-        loss, rest = self._loss(entry, len(frequency))
-        return FlexibleBody(
-            tuple(dofs), 0.5 * (rigid[:6] + rigid[:6].T), rigid[6:], shapes,
-            hz_to_rad_s(frequency) ** 2, 0.5 * (residual + residual.T), loss, rest)
-
-    def _numbers(self, file: str, columns: int) -> FloatArray:
-        path = self._path(file)
-        matrices.refuse_foreign(path)
-        return tables.numbers_of(path, stiffness_file.text_of(path), columns=columns)
-
-    def _of_matrices(
-        self, index: int, entry: schema.FlexibleEntry, highest: float,
-    ) -> FlexibleBody:
-        assert entry.stiffness is not None
-        assert entry.mass is not None
-        assert entry.dofs is not None
-        paths = [self._path(file) for file in (entry.stiffness, entry.mass, entry.dofs)]
-        stiffness, mass = (matrices.read(path) for path in paths[:2])
-        order = None
-        if paths[0].suffix.lower() == matrices.STIFFNESS:
-            order = matrices.order_of_calculix(paths[0].with_suffix(matrices.ORDER))
-        rows = tables.motions(paths[2], stiffness_file.text_of(paths[2]))
-        wanted = Interface.of(paths[2], rows, stiffness.shape[0], order)
-        elements = FiniteElements.of(stiffness, mass, wanted.dofs, wanted.pick, wanted.known)
-        loss, rest = self._loss(entry, 1)
-        if entry.grounded:
-            return elements.grounded(highest, loss=rest)
-        return elements.body(highest, loss=float(loss[0]))
+        loss = Loss(entry.loss_factor, entry.damping_ratios)
+        modes, residual, rigid, dofs = map(
+            at, (entry.modes, entry.residual, entry.rigid, entry.dofs))
+        if modes is not None:
+            assert residual is not None
+            assert rigid is not None
+            return of_modes(modes, residual=residual, rigid=rigid, dofs=dofs, loss=loss)
+        stiffness, mass = at(entry.stiffness), at(entry.mass)
+        assert stiffness is not None
+        assert mass is not None
+        assert dofs is not None
+        return of_matrices(stiffness, mass=mass, dofs=dofs, highest=highest, loss=loss,
+                           grounded=entry.grounded)
 
     def _on_ground(
         self, index: int, entry: schema.FoundationEntry, body: FlexibleBody,

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse
 
 from rotorsoil_ros.arrays import FloatArray
-from rotorsoil_ros.case.flexible.tables import Row
+from rotorsoil_ros.case.flexible.tables import at_once, Row
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof
@@ -68,10 +69,8 @@ class Interface:
         for row in rows:
             if row.is_node:
                 places.setdefault(row.dof.station, []).append(row)
-            else:
-                found.single(row)
-        for group in places.values():
-            found.place(group)
+        at_once([*(partial(found.single, row) for row in rows if not row.is_node),
+                 *(partial(found.place, group) for group in places.values())])
         if not found.dofs:
             raise InputError(f'{path}: names no seat and no contact')
         pick = scipy.sparse.csc_matrix(np.stack(found.picks))

@@ -1,11 +1,13 @@
 """What the CSV files of a foundation that bends say: its motions, modes and flexibility."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 import csv
 from dataclasses import dataclass
+from functools import partial
 import math
 from pathlib import Path
 import re
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +16,15 @@ from rotorsoil_ros.case.document import shown
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, PROBE, SEAT
+
+T = TypeVar('T')
+
+# What is symmetric is so by this share of its largest entry, and places agree, as printed digits
+# do.
+_SYMMETRIC, _PRINTED = 1e-4, 1e-4
+
+# More of one kind tell nothing new.
+_MOST_FAULTS = 20
 
 INTERNAL = 'internal'
 _KINDS = (SEAT, CONTACT, PROBE, INTERNAL)
@@ -54,6 +65,30 @@ class Row:
     is_node: bool
 
 
+def at_once(builds: Iterable[Callable[[], T]]) -> list[T]:
+    """
+    Return what all of these read.
+
+    Raises
+    ------
+    InputError
+        With what is wrong with any of them, a line each.
+
+    """
+    found, faults = list[T](), list[str]()
+    for build in builds:
+        try:
+            found.append(build())
+        except InputError as error:
+            faults += str(error).splitlines()
+    if len(faults) > _MOST_FAULTS:
+        path = faults[0].partition(': ')[0]
+        faults[_MOST_FAULTS:] = [f'{path}: and {len(faults) - _MOST_FAULTS} more like these']
+    if faults:
+        raise InputError('\n'.join(faults))
+    return found
+
+
 def lines_of(path: Path, text: str) -> list[tuple[int, list[str]]]:
     """Return the lines of a CSV file that are neither empty nor comments, by their number."""
     found = [(number, [cell.strip() for cell in row])
@@ -79,11 +114,14 @@ def numbers_of(path: Path, text: str, *, columns: int | None = None) -> FloatArr
     """Return a file of numbers only, (rows, columns)."""
     lines = lines_of(path, text)
     width = columns or len(lines[0][1])
-    for line, row in lines:
+
+    def numbers(line: int, row: list[str]) -> list[float]:
         if len(row) != width:
             raise InputError(f'{path}: line {line}: must hold {width} numbers, got {len(row)}')
-    return np.array([[number(path, line, f'column {place}', cell)
-                      for place, cell in enumerate(row, start=1)] for line, row in lines])
+        return at_once(partial(number, path, line, f'column {place}', cell)
+                       for place, cell in enumerate(row, start=1))
+
+    return np.array(at_once(partial(numbers, line, row) for line, row in lines))
 
 
 def motions(path: Path, text: str) -> list[Row]:
@@ -104,51 +142,67 @@ def motions(path: Path, text: str) -> list[Row]:
 
     """
     (first, header), *lines = lines_of(path, text)
-    for name in header:
-        if name not in _KNOWN:
-            raise InputError(f'{path}: line {first}: column {shown(name)} is not known; known are '
-                             f'{", ".join(_KNOWN)}')
-    for name in _NEEDED:
-        if name not in header:
-            raise InputError(f'{path}: line {first}: column {name} is missing')
-    rows = []
-    for line, cells in lines:
+    faults = [f'column {shown(name)} is not known; known are {", ".join(_KNOWN)}'
+              for name in header if name not in _KNOWN]
+    faults += [f'column {name} is missing' for name in _NEEDED if name not in header]
+    faults += [f'column {name} stands here twice' for name in dict.fromkeys(header)
+               if header.count(name) > 1]
+    if faults:
+        raise InputError('\n'.join(f'{path}: line {first}: {fault}' for fault in faults))
+
+    def row(line: int, cells: list[str]) -> Row | None:
         if len(cells) != len(header):
             raise InputError(f'{path}: line {line}: must have {len(header)} cells, '
                              f'got {len(cells)}')
-        row = _row(path, line, dict(zip(header, cells, strict=True)))
-        if row is not None:
-            rows.append(row)
-    return rows
+        return _row(path, line, dict(zip(header, cells, strict=True)))
+
+    rows = at_once(partial(row, line, cells) for line, cells in lines)
+    return [one for one in rows if one is not None]
 
 
 def _row(path: Path, line: int, cells: dict[str, str]) -> Row | None:
-    kind = cells['kind']
-    if kind not in _KINDS:
-        raise InputError(f'{path}: line {line}: kind must be one of {", ".join(_KINDS)}, '
-                         f'got {shown(kind)}')
+    kind, axis = cells['kind'], cells['direction']
     if kind == INTERNAL:
         return None
-    axis = cells['direction']
-    if axis not in (*DOFS, ALL):
-        raise InputError(f'{path}: line {line}: direction must be one of {", ".join(DOFS)}, or '
-                         f'{ALL} of a node, got {shown(axis)}')
     station = cells['name'].removesuffix(f'_{axis}')
-    if not _STATION.fullmatch(station):
-        raise InputError(f'{path}: line {line}: name must be small letters, digits and _, '
-                         f'got {shown(cells["name"])}')
-    x, y, z = (number(path, line, f'{name} [m]', cells[name]) for name in 'xyz')
-    area = number(path, line, 'area [m^2]', cells['area']) if cells.get('area') else 0.0
-    if not area >= 0.0:
-        raise InputError(f'{path}: line {line}: area must be >= 0 m^2, got {area:g}')
-    index, node = (None if not cells.get(name) else _whole(path, line, name, cells[name])
+
+    at = f'{path}: line {line}:'
+
+    def refuse() -> float:
+        faults = [f'{at} {rule}, got {shown(got)}' for holds, rule, got in (
+            (kind in _KINDS, f'kind must be one of {", ".join(_KINDS)}', kind),
+            (axis in (*DOFS, ALL),
+             f'direction must be one of {", ".join(DOFS)}, or {ALL} of a node', axis),
+            (_STATION.fullmatch(station), 'name must be small letters, digits and _',
+             cells['name'])) if not holds]
+        if faults:
+            raise InputError('\n'.join(faults))
+        return 0.0
+
+    reads: list[Callable[[], float]] = [
+        refuse, *(partial(number, path, line, f'{name} [m]', cells[name]) for name in 'xyz')]
+    given = [name for name in ('index', 'node') if cells.get(name)]
+    reads += [partial(whole, path, line, name, cells[name]) for name in given]
+    if cells.get('area'):
+        reads.append(partial(_area, path, line, cells['area']))
+    _, x, y, z, *more = at_once(reads)
+    index, node = (int(more[given.index(name)]) if name in given else None
                    for name in ('index', 'node'))
-    dof = Dof(station, 'x' if axis == ALL else axis, kind, (x, y, z), area)
+    of_contact = more[-1] if cells.get('area') else 0.0
+    dof = Dof(station, 'x' if axis == ALL else axis, kind, (x, y, z), of_contact)
     return Row(line, dof, None if index is None else index - 1, node, axis == ALL)
 
 
-def _whole(path: Path, line: int, what: str, cell: str) -> int:
-    if not (cell.isascii() and cell.isdigit() and 0 < len(cell) < 12 and int(cell) > 0):
+def _area(path: Path, line: int, cell: str) -> float:
+    area = number(path, line, 'area [m^2]', cell)
+    if not area >= 0.0:
+        raise InputError(f'{path}: line {line}: area must be >= 0 m^2, got {area:g}')
+    return area
+
+
+def whole(path: Path, line: int, what: str, cell: str) -> int:
+    """Return a cell as a whole number from 1 on."""
+    if not (cell.isascii() and cell.isdigit() and len(cell) < 12 and int(cell) > 0):
         raise InputError(f'{path}: line {line}: {what} must be a whole number from 1 on, '
                          f'got {shown(cell)}')
     return int(cell)
@@ -178,21 +232,75 @@ def modes(path: Path, text: str) -> tuple[list[str], FloatArray, FloatArray]:
     if not lines or lines[0][1][0] != 'hz':
         raise InputError(f'{path}: needs a row of frequencies that begins with hz, below the '
                          'header')
-    table = []
-    for line, row in lines:
+
+    def numbers(line: int, row: list[str]) -> list[float]:
         if len(row) != len(header):
             raise InputError(f'{path}: line {line}: must hold {len(header)} cells, got {len(row)}')
-        table.append([number(path, line, name, cell)
-                      for name, cell in zip(header[1:], row[1:], strict=True)])
+        return at_once(partial(number, path, line, name, cell)
+                       for name, cell in zip(header[1:], row[1:], strict=True))
+
+    table = at_once(partial(numbers, line, row) for line, row in lines)
     names = [row[0] for _, row in lines[1:]]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise InputError(f'{path}: motion {shown(twice)} stands here twice')
-    found = np.array(table).reshape(len(lines), len(header) - 1)
-    if not np.all(found[0] > 0.0):
-        raise InputError(f'{path}: frequencies must be > 0 Hz, of elastic modes only, got '
-                         f'{found[0].min():g}; rigid motion belongs into the file rigid')
+    found = np.array(table)
+    faults = [f'motion {shown(name)} stands here twice' for name in dict.fromkeys(names)
+              if names.count(name) > 1]
+    faults += [f'frequency of {name} must be > 0 Hz, of elastic modes only, got {hertz:g}; rigid '
+               'motion belongs into the file rigid'
+               for name, hertz in zip(header[1:], found[0].tolist(), strict=True) if hertz <= 0.0]
+    if faults:
+        raise InputError('\n'.join(f'{path}: {fault}' for fault in faults))
     return names, found[0], found[1:]
+
+
+def flexibility_of(path: Path, matrix: FloatArray, names: Sequence[str]) -> FloatArray:
+    """Return a residual flexibility over named motions; an InputError says what is wrong."""
+    if len(matrix) != len(names) or matrix.shape[1] != len(names):
+        raise InputError(f'{path}: must have {len(names)} rows and columns, those of the modes, '
+                         f'got {len(matrix)} and {matrix.shape[1]}')
+    return _symmetric(path, 'flexibility', matrix)
+
+
+def rigid_of(
+    path: Path, table: FloatArray, names: Sequence[str],
+) -> tuple[FloatArray, FloatArray]:
+    """Return mass (6, 6) and rigid motion (p, 6) of named motions; an InputError as above."""
+    if len(table) != len(DOFS) + len(names):
+        raise InputError(f'{path}: must have six rows of mass and {len(names)} of rigid motion, '
+                         f'those of the modes, got {len(table)}')
+    mass = _symmetric(path, 'mass', table[:len(DOFS)])
+    least = float(np.linalg.eigvalsh(mass)[0])
+    if not least > 0.0:
+        raise InputError(f'{path}: mass must be positive in every direction, got {least:.3g}')
+    return mass, table[len(DOFS):]
+
+
+def _symmetric(path: Path, what: str, matrix: FloatArray) -> FloatArray:
+    skew = float(np.abs(matrix - matrix.T).max() / (np.abs(matrix).max() or 1.0))
+    if not skew <= _SYMMETRIC:
+        raise InputError(f'{path}: {what} must be symmetric within {_SYMMETRIC:g} of its largest '
+                         f'entry, got {skew:.3g}')
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def dofs_among(
+    path: Path, rows: Sequence[Row], names: Sequence[str], rigid: FloatArray,
+) -> list[Dof]:
+    """Return named motions as a table describes them; their rigid motion (p, 6) has to fit."""
+    known = {f'{row.dof.station}_{row.dof.axis}': row for row in rows}
+    reach = 1.0 + np.abs(rigid).max(initial=0.0)
+
+    def of(name: str, moves: FloatArray) -> Dof:
+        if name not in known:
+            raise InputError(f'{path}: has no {name}, which the modes have')
+        row = known[name]
+        off = float(np.abs(row.dof.rigid_row - moves).max())
+        if off > _PRINTED * reach:
+            raise InputError(f'{path}: line {row.line}: place of {name} must be that of the file '
+                             f'rigid, from the same origin, got {off:.3g} m away')
+        return row.dof
+
+    return at_once(partial(of, name, moves)
+                   for name, moves in zip(names, rigid, strict=True))
 
 
 def dofs_of(path: Path, names: Sequence[str], rows: FloatArray) -> list[Dof]:
@@ -211,14 +319,8 @@ def dofs_of(path: Path, names: Sequence[str], rows: FloatArray) -> list[Dof]:
 
     """
     places: dict[str, list[float]] = {}
-    split = []
-    for name, row in zip(names, rows.tolist(), strict=True):
-        channel = Channel.parse(name)
-        station, axis = channel.place, channel.axis
-        if axis not in DOFS or not _STATION.fullmatch(station):
-            raise InputError(f'{path}: names of motions must be <station>_<x, y, z, rx, ry or '
-                             f'rz>, got {shown(name)}')
-        split.append((station, axis))
+    split = at_once(partial(_split, path, name) for name in names)
+    for (station, axis), row in zip(split, rows.tolist(), strict=True):
         place = places.setdefault(station, [math.nan] * 3)
         x, y, z = {'x': (None, -row[5], row[4]), 'y': (row[5], None, -row[3]),
                    'z': (-row[4], row[3], None)}.get(axis, (None, None, None))
@@ -231,3 +333,12 @@ def dofs_of(path: Path, names: Sequence[str], rows: FloatArray) -> list[Dof]:
         x, y, z = places[station]
         found.append(Dof(station, axis, CONTACT if on_ground else SEAT, (x, y, z)))
     return found
+
+
+def _split(path: Path, name: str) -> tuple[str, str]:
+    """Return station and axis of a motion."""
+    channel = Channel.parse(name)
+    if channel.axis not in DOFS or not _STATION.fullmatch(channel.place):
+        raise InputError(f'{path}: names of motions must be <station>_<x, y, z, rx, ry or rz>, '
+                         f'got {shown(name)}')
+    return channel.place, channel.axis

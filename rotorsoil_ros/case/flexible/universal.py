@@ -16,6 +16,12 @@ _REAL = 0.05
 _MODES = 55
 
 
+def is_universal(path: Path, text: str) -> bool:
+    """Whether a file is a universal one, or ought to be."""
+    return text.lstrip().partition('\n')[0].strip() == '-1' or (
+        path.suffix.lower() in ('.unv', '.uff') and not text.lstrip().startswith('dof'))
+
+
 def modes(path: Path) -> tuple[list[str], FloatArray, FloatArray]:
     """
     Read the mode shapes of a universal file.
