@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.bags.tables.imported import import_table, ImportedTable
     from rotorsoil_ros.case.design.report import DesignReport
     from rotorsoil_ros.case.design.variants import Study, study
+    from rotorsoil_ros.case.flexible.files import read_flexible
     from rotorsoil_ros.case.journal_entries import BearingStates
     from rotorsoil_ros.case.machine import load, Machine
     from rotorsoil_ros.case.plant.together import Plant, Shaken
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
     from rotorsoil_ros.ground.table import ComplianceTable
     from rotorsoil_ros.machine.coupled import CoupledModel
     from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter
+    from rotorsoil_ros.machine.flexible.body import Dof, FlexibleBody
+    from rotorsoil_ros.machine.flexible.reduction import FiniteElements
     from rotorsoil_ros.machine.foundation import Foundation
     from rotorsoil_ros.machine.modes.campbell import Campbell
     from rotorsoil_ros.machine.modes.critical import CriticalSpeed
@@ -72,15 +75,15 @@ __version__ = '0.1.0'
 __all__ = [
     'Bearing', 'BearingStates', 'BoundaryElementModel', 'Bounds', 'Campbell', 'Channel', 'Circle',
     'Comparison', 'ComplianceTable', 'ConeModel', 'CoupledModel', 'CriticalSpeed', 'DampingSplit',
-    'DampingSplitter', 'DesignReport', 'Disc', 'EmbeddedConeModel', 'Embedment', 'Foundation',
-    'ImportedTable', 'InfiniteElementModel', 'InputError', 'JournalBearing', 'JournalStates',
-    'Layer', 'LayeredSiteModel', 'LayeredSoil', 'Machine', 'Matching', 'Material',
-    'NotSolvedError', 'Oil', 'OutOfTableError', 'Part', 'Pedestal', 'Plan', 'Plant', 'Prediction',
-    'Predictor', 'Probe', 'Profile', 'Record', 'Rectangle', 'Response', 'ResponseTable',
-    'RigidSoil', 'Rotor', 'RotorSoilError', 'ShaftSection', 'Shaken', 'Site', 'Soil', 'SoilModel',
-    'SoilSpread', 'SpeedSource', 'Study', 'ThinLayerModel', 'Transmissibility', 'Verdict',
-    'Viscosity', 'Wish', 'compare', 'export_log', 'import_table', 'load', 'predict_many',
-    'read_profile', 'study',
+    'DampingSplitter', 'DesignReport', 'Disc', 'Dof', 'EmbeddedConeModel', 'Embedment',
+    'FiniteElements', 'FlexibleBody', 'Foundation', 'ImportedTable', 'InfiniteElementModel',
+    'InputError', 'JournalBearing', 'JournalStates', 'Layer', 'LayeredSiteModel', 'LayeredSoil',
+    'Machine', 'Matching', 'Material', 'NotSolvedError', 'Oil', 'OutOfTableError', 'Part',
+    'Pedestal', 'Plan', 'Plant', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Record',
+    'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
+    'ShaftSection', 'Shaken', 'Site', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource', 'Study',
+    'ThinLayerModel', 'Transmissibility', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
+    'import_table', 'load', 'predict_many', 'read_flexible', 'read_profile', 'study',
 ]
 
 # Which room a public name lives in.
@@ -92,6 +95,7 @@ _ROOMS = {
     'bags.tables.imported': ('ImportedTable', 'import_table'),
     'case.design.report': ('DesignReport',),
     'case.design.variants': ('Study', 'study'),
+    'case.flexible.files': ('read_flexible',),
     'case.journal_entries': ('BearingStates',),
     'case.machine': ('Machine', 'load'),
     'case.plant.together': ('Plant', 'Shaken'),
@@ -111,6 +115,8 @@ _ROOMS = {
     'ground.table': ('ComplianceTable',),
     'machine.coupled': ('CoupledModel',),
     'machine.damping': ('DampingSplit', 'DampingSplitter'),
+    'machine.flexible.body': ('Dof', 'FlexibleBody'),
+    'machine.flexible.reduction': ('FiniteElements',),
     'machine.foundation': ('Foundation',),
     'machine.modes.campbell': ('Campbell',),
     'machine.modes.critical': ('CriticalSpeed',),

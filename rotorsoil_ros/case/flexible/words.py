@@ -39,7 +39,7 @@ def _told(block: Foundation, body: FlexibleBody) -> Iterator[tuple[str, str]]:
         x, y, z = _centre_of_gravity(body)
         yield f'{name}: mass and centre of gravity', (
             f'{block.mass:.7g} kg at x {x:.4g}, y {y:.4g}, z {z:.4g} m of its own axes')
-    hertz = np.sort(rad_s_to_hz(np.sqrt(body.stiffness)))
+    hertz = np.sort(rad_s_to_hz(body.frequencies))
     yield f'{name}: bends', (
         ', '.join(f'{one:.4g}' for one in hertz[:_TOLD].tolist())
         + (', ...' if len(hertz) > _TOLD else '') + ' Hz where '

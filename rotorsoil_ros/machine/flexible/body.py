@@ -214,8 +214,7 @@ class FlexibleBody:
     @property
     def highest(self) -> float:
         """Frequency of the highest mode [rad/s]; infinite where the rest is all there is."""
-        return float(np.sqrt(self.stiffness.max(initial=np.inf if not len(self.stiffness)
-                                                else 0.0)))
+        return float(self.frequencies.max()) if len(self.stiffness) else np.inf
 
     def stiffer(self, factor: float) -> Self:
         """Return the same body of another modulus."""
@@ -231,6 +230,39 @@ class FlexibleBody:
         """Root of the elastic motion of each motion per force on it at rest, (p,)."""
         modal = (self.shapes**2 / self.stiffness).sum(axis=1)
         return np.asarray(np.sqrt(np.abs(self.residual.diagonal()) + modal))
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Of its elastic modes, rising as they were given, (m,) [rad/s]."""
+        return np.asarray(np.sqrt(self.stiffness))
+
+    @classmethod
+    def from_modes(
+        cls, dofs: Sequence[Dof], *, frequencies: FloatArray, shapes: FloatArray,
+        residual: FloatArray, mass: FloatArray, loss_factor: float,
+    ) -> Self:
+        """
+        Return the body of modes.
+
+        Parameters
+        ----------
+        dofs : sequence of Dof
+            The interface, p motions.
+        frequencies : (m,) float array
+            Of elastic modes [rad/s].
+        shapes : (p, m) float array
+            Of unit modal mass [1/sqrt(kg)].
+        residual : (p, p) float array
+            Static flexibility of what these modes leave out [m/N].
+        mass : (6, 6) float array
+            Of the rigid body about the origin [kg, kg m, kg m^2].
+        loss_factor : float
+            Of its material [-].
+
+        """
+        rows = np.array([dof.rigid_row for dof in dofs])
+        return cls(tuple(dofs), mass, rows, shapes, frequencies**2, residual,
+                   np.full(len(frequencies), loss_factor), loss_factor)
 
     def to_plain(self) -> dict[str, Any]:
         """Return everything as lists and numbers."""

@@ -1,6 +1,6 @@
 """How stiffness and mass of finite elements become a body: modes, and what they leave out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -85,6 +85,15 @@ class FiniteElements:
         rigid = _rigid(stiffness, [index for index, _ in known],
                        np.array([dof.rigid_row for _, dof in known]).reshape(-1, 6))
         return cls(stiffness, mass, tuple(interface), pick, rigid)
+
+    @classmethod
+    def at(cls, stiffness: Sparse, mass: Sparse, dofs: Mapping[int, Dof]) -> 'FiniteElements':
+        """Check matrices as `of` does; the motions that are asked for are rows of them."""
+        size = stiffness.shape[0]
+        pick = scipy.sparse.csc_matrix(
+            (np.ones(len(dofs)), (np.arange(len(dofs)), list(dofs))), shape=(len(dofs), size))
+        return cls.of(scipy.sparse.csc_matrix(stiffness), scipy.sparse.csc_matrix(mass),
+                      tuple(dofs.values()), pick, tuple(dofs.items()))
 
     @property
     def held(self) -> float:

@@ -9,6 +9,7 @@ import pytest
 import scipy.io
 import scipy.sparse
 
+import rotorsoil_ros as rs
 from rotorsoil_ros.case.flexible import matrices, tables
 from rotorsoil_ros.case.flexible.files import read_flexible
 from rotorsoil_ros.case.flexible.foreign import content_of
@@ -24,7 +25,7 @@ UP_TO = 340.0
 
 
 def hertz(body):
-    return rad_s_to_hz(np.sqrt(body.stiffness))
+    return rad_s_to_hz(body.frequencies)
 
 
 def dofs_text(first='node'):
@@ -378,6 +379,22 @@ def test_modes_and_matrices_of_one_beam_are_one_body(beam_files):
             scaled @ scaled.T + one.residual,
             (tabled.shapes / tabled.stiffness) @ tabled.shapes.T + tabled.residual,
             atol=1e-12)
+
+
+def test_arrays_and_files_of_one_beam_are_one_body(beam_files):
+    tabled = by_modes(beam_files)
+    again = rs.FlexibleBody.from_modes(
+        tabled.dofs, frequencies=tabled.frequencies, shapes=tabled.shapes,
+        residual=tabled.residual, mass=tabled.mass, loss_factor=0.04)
+    np.testing.assert_allclose(again.rows, tabled.rows, atol=1e-12)
+    rows = [*range(6), *range(6 * ELEMENTS, 6 * ELEMENTS + 6), *range(30, 36)]
+    elements = rs.FiniteElements.at(
+        *beams.matrices(ELEMENTS), dict(zip(rows, tabled.dofs, strict=True)))
+    body = elements.body(float(tabled.frequencies[-1]) + 1.0, loss=0.04)
+    np.testing.assert_allclose(body.stiffness, tabled.stiffness, rtol=1e-9)
+    np.testing.assert_allclose(body.residual, tabled.residual, atol=1e-12)
+    with pytest.raises(rs.RotorSoilError, match='files must be modes, residual and rigid, or'):
+        rs.read_flexible(loss_factor=0.0, stiffness='K.mtx', mass='M.mtx')
 
 
 def test_faults_of_all_files_of_a_body_come_at_once(beam_files):
