@@ -15,6 +15,7 @@ from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.flexible.files import Loss, of_matrices, of_modes
 from rotorsoil_ros.channel import ACROSS, DOFS
+from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
 from rotorsoil_ros.machine.flexible.body import CONTACT, EACH, FlexibleBody, PROBE
 from rotorsoil_ros.machine.flexible.rigidity import ABOVE_EXCITATION

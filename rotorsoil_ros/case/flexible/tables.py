@@ -17,7 +17,7 @@ from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, PROBE, SEAT
 
-T = TypeVar('T')
+Read = TypeVar('Read')
 
 # What is symmetric is so by this share of its largest entry, and places agree, as printed digits
 # do.
@@ -65,7 +65,7 @@ class Row:
     is_node: bool
 
 
-def at_once(builds: Iterable[Callable[[], T]]) -> list[T]:
+def at_once(builds: Iterable[Callable[[], Read]]) -> list[Read]:
     """
     Return what all of these read.
 
@@ -75,7 +75,7 @@ def at_once(builds: Iterable[Callable[[], T]]) -> list[T]:
         With what is wrong with any of them, a line each.
 
     """
-    found, faults = list[T](), list[str]()
+    found, faults = list[Read](), list[str]()
     for build in builds:
         try:
             found.append(build())
