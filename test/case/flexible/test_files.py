@@ -6,6 +6,7 @@ import beams
 from foundations import REFERENCE
 import numpy as np
 import pytest
+import pyuff
 import scipy.io
 import scipy.sparse
 
@@ -176,7 +177,6 @@ def beam_modes(count=6, mass=12.5):
 
 @pytest.mark.parametrize('name', ['beam.unv', 'beam.uff', 'beam.csv'])
 def test_modes_of_a_universal_file_are_those_of_the_beam(tmp_path, name):
-    pytest.importorskip('pyuff', reason='pyuff is optional')
     frequency, shapes, exact, numbers = beam_modes()
     path = tmp_path / name
     path.write_text(universal_text(frequency, shapes, 12.5, numbers))
@@ -191,7 +191,6 @@ def test_modes_of_a_universal_file_are_those_of_the_beam(tmp_path, name):
 
 
 def test_a_universal_file_that_pyuff_writes_reads_the_same(tmp_path):
-    pyuff = pytest.importorskip('pyuff', reason='pyuff is optional')
     frequency, shapes, _, numbers = beam_modes()
     (tmp_path / 'own.unv').write_text(universal_text(frequency, shapes, 12.5, numbers))
     file = pyuff.UFF(str(tmp_path / 'theirs.unv'))
@@ -213,7 +212,6 @@ def test_a_universal_file_that_pyuff_writes_reads_the_same(tmp_path):
     ({'numbers': ([1, 2], [1, 3])}, 'data set 55 number 2: has other nodes than the first'),
     ({'kind': 58}, 'holds no data set 55, mode shapes')])
 def test_what_is_wrong_with_a_universal_file_is_told(tmp_path, change, said):
-    pytest.importorskip('pyuff', reason='pyuff is optional')
     first, second = change.get('numbers', ([1, 2], [1, 2]))
     frequency, mass = change.get('frequency', [40.0, 50.0]), change.get('mass', 1.0)
     shape = [[(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]]
