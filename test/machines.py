@@ -52,6 +52,15 @@ def paper_rotor(*, stiffness=1e9, damping=5e2, elements=28, foundation='block'):
                           foundation=foundation)])
 
 
+def renamed(rotor, name, foundation=None):
+    """Return a rotor whose stations carry the name of their machine, on a block if one is told."""
+    def of(stations):
+        return tuple(replace(one, name=f'{name}_{one.name}') for one in stations)
+
+    return replace(rotor, discs=of(rotor.discs), probes=of(rotor.probes), bearings=tuple(
+        replace(one, foundation=foundation or one.foundation) for one in of(rotor.bearings)))
+
+
 def paper_machine(soil_model=CONE, *, mass=42.0, **rotor):
     """Return the seed paper's machine on one block."""
     inertia = mass / 12.0

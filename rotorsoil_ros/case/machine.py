@@ -137,7 +137,9 @@ class Machine(ModalAnswers):
             If an undamped resonance is hit.
 
         """
-        found = self.model.support.standing(hz_to_rad_s(numbers('hz', hz))).receptance
+        own = self.model.own_seats
+        found = self.model.support.standing(
+            hz_to_rad_s(numbers('hz', hz))).receptance[:, own, own]
         if not np.all(np.isfinite(found)):
             raise NotSolvedError('the foundation has no finite receptance: a resonance without '
                                  'damping is hit, or nothing holds it')

@@ -42,12 +42,23 @@ def campbell(arguments: Namespace) -> int:
     speed = found.speed_rpm if plant else found.speed
     frequency = found.frequency_hz if plant else found.omega
     # A speed may have fewer modes than wanted.
-    rows = [(at, mode + 1, *numbers) for at, *of_speed in zip(
-                speed.tolist(), frequency.tolist(), found.damping_ratio.tolist(),
-                found.whirl.tolist(), strict=True)
-            for mode, numbers in enumerate(zip(*of_speed, strict=True)) if numbers[2] != 0]
-    write_table(arguments.output, [*header, 'damping_ratio', 'whirl'], rows)
+    rows = [(at, mode + 1, *numbers, *_neighbour(machine, owner)) for at, owners, *of_speed in zip(
+                speed.tolist(), found.owner.tolist(), frequency.tolist(),
+                found.damping_ratio.tolist(), found.whirl.tolist(), strict=True)
+            for mode, (owner, *numbers) in enumerate(zip(owners, *of_speed, strict=True))
+            if numbers[2] != 0]
+    write_table(arguments.output, [*header, 'damping_ratio', 'whirl', *_of_plant(machine)], rows)
     return 0
+
+
+def _of_plant(machine: Machine) -> list[str]:
+    """Return the column that says of a machine among others whose modes are whose."""
+    return ['neighbour'] if len(machine.model.machines) > 1 else []
+
+
+def _neighbour(machine: Machine, owner: int) -> list[str]:
+    """Return the neighbour that a mode is of, if it has a column."""
+    return [machine.model.machines[owner - 1] if owner else '' for _ in _of_plant(machine)]
 
 
 def _tell_unstable(machine: Machine, highest_rpm: float) -> None:
@@ -62,10 +73,11 @@ def _criticals(arguments: Namespace, machine: Machine) -> int:
     with progress('solving') as _:
         criticals = machine.critical_speeds(rpm_range=(low, high))
     plant = units_of(arguments) == PLANT
-    header = ['speed_rpm' if plant else 'speed_rad_s', 'whirl', 'damping_ratio']
+    header = ['speed_rpm' if plant else 'speed_rad_s', 'whirl', 'damping_ratio',
+              *_of_plant(machine)]
     rows: list[tuple[float | str, ...]] = [
-        (critical.speed_rpm if plant else critical.speed, critical.whirl, critical.damping_ratio)
-        for critical in criticals]
+        (critical.speed_rpm if plant else critical.speed, critical.whirl, critical.damping_ratio,
+         *_neighbour(machine, critical.owner)) for critical in criticals]
     if arguments.running is not None:
         header += ['amplification_factor', 'separation_margin', 'required_margin',
                    'half_power_factor', 'name']

@@ -230,7 +230,8 @@ def _criticals(
         if critical.speed > high:
             asks = critical.required_margin(high)
             how.append(f'{critical.speed / high - 1.0:.1%} above the speed range, '
-                       + (f'{asks:.0%} is asked' if asks else 'no margin is asked'))
+                       + (f'{asks:.0%} is asked' if asks else 'no margin is asked')
+                       + (' as far as it is excited' if asks and critical.owner else ''))
         lines.append((f'critical speed {units.speed(critical.speed)}',
                       f'{", ".join(how)}, {names.of_critical(critical)}'))
     if len(criticals) < len(found):

@@ -28,6 +28,7 @@ _LARGEST_DRAWN_SHAPES = 6
 # Share of the range beyond which a label would leave the diagram.
 _NO_ROOM = 0.88
 _WHIRLS = {1: ('forward', COLOURS[0], '-'), -1: ('backward', COLOURS[1], '--')}
+_NEIGHBOURS = 'of a neighbour', '0.45', ':'
 
 
 def modal_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, Figure]]:
@@ -50,7 +51,8 @@ def campbell_diagram(
     for number, (row, mode) in enumerate(_branches(found, highest), start=1):
         speed = rad_s_to_rpm(found.speed[row])
         whirl = int(np.sign(found.whirl[row, mode].sum() + 0.5))
-        _, colour, line = _WHIRLS[whirl]
+        beside = np.count_nonzero(found.owner[row, mode]) > 0.5 * len(row)
+        _, colour, line = _NEIGHBOURS if beside else _WHIRLS[whirl]
         style = {'color': colour, 'linestyle': line, 'linewidth': 1.2}
         # What is hardly felt stays pale.
         damping = found.damping_ratio[row, mode]
@@ -69,7 +71,7 @@ def campbell_diagram(
     top.set(ylabel='natural frequency [Hz]', ylim=(0.0, rad_s_to_hz(highest)))
     bottom.set(xlabel='speed [rpm]', ylabel='damping [% of critical]')
     _scale_damping(bottom)
-    for label, colour, line in _WHIRLS.values():
+    for label, colour, line in (*_WHIRLS.values(), *[_NEIGHBOURS] * bool(found.owner.any())):
         top.plot([], [], color=colour, linestyle=line, label=label)
     legend_below(figure, top)
     tidy(top)
@@ -127,7 +129,8 @@ def critical_shapes(
     figure = Figure(figsize=(7.5, 1.6 * len(criticals) + 0.8), layout='constrained')
     rows = figure.subplots(len(criticals), 1, sharex=True, squeeze=False)[:, 0]
     for critical, axes in zip(criticals, rows, strict=True):
-        housings = (model.support.motion_rows @ critical.support).reshape(-1, 2)
+        seats = model.support.motion_rows[model.own_seats]
+        housings = (seats @ critical.support).reshape(-1, 2)
         draw_shape(axes, case, case.rotor.node_positions,
                    *_at_their_most(critical.deflection, housings))
         axes.set_ylim(-1.15, 1.15)

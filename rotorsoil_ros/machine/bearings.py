@@ -1,6 +1,8 @@
 """What all bearings and seals of a rotor are together, at a speed and to a vibration."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 import math
 
 import numpy as np
@@ -20,10 +22,30 @@ class Bearings:
     ----------
     each : tuple of Bearing
         In the order of the rotor.
+    at : tuple of float or None
+        Speed of the shaft in each that turns at one of its own [rad/s]; None, or nothing at all,
+        where it has the speed that is asked about.
 
     """
 
     each: tuple[Bearing, ...]
+    at: tuple[float | None, ...] = ()
+
+    @cached_property
+    def _at(self) -> tuple[float | None, ...]:
+        return self.at or (None,) * len(self.each)
+
+    @cached_property
+    def following(self) -> tuple[Bearing, ...]:
+        """Those whose shaft has the speed that is asked about."""
+        return tuple(one for one, own in zip(self.each, self._at, strict=True) if own is None)
+
+    def between(
+        self, span: tuple[float, float],
+    ) -> Iterator[tuple[Bearing, tuple[float, float]]]:
+        """Yield each, and between which speeds its shaft turns while a span is asked about."""
+        for one, own in zip(self.each, self._at, strict=True):
+            yield one, span if own is None else (own, own)
 
     @property
     def frequencies(self) -> FloatArray:
@@ -55,7 +77,7 @@ class Bearings:
             If they hold none of it.
 
         """
-        ranges = [bearing.speed_range for bearing in self.each]
+        ranges = [bearing.speed_range for bearing in self.following]
         ranges += [bearing.frequency_range for bearing in self.each if following]
         low = max([span[0], *(first for first, _ in ranges)])
         high = min([span[1], *(last for _, last in ranges)])
@@ -74,7 +96,7 @@ class Bearings:
         Parameters
         ----------
         speed, omega : (n,) float arrays
-            Rotor speed and frequency of the vibration [rad/s].
+            Speed that is asked about, and frequency of the vibration [rad/s].
 
         Returns
         -------
@@ -87,9 +109,10 @@ class Bearings:
                      for one in self.each)
         rows = slice(None) if tabled else slice(1)
         total = np.zeros((3, len(speed[rows]), 2 * len(self.each), 2 * len(self.each)))
-        for index, bearing in enumerate(self.each):
+        for index, (bearing, own) in enumerate(zip(self.each, self._at, strict=True)):
             pair = slice(2 * index, 2 * index + 2)
-            total[:, :, pair, pair] = bearing.coefficients(speed[rows], omega[rows])
+            turns = speed[rows] if own is None else np.full(len(speed[rows]), own)
+            total[:, :, pair, pair] = bearing.coefficients(turns, omega[rows])
         stiffness, damping, inertia = np.broadcast_to(
             total, (3, len(speed), *total.shape[2:]))
         return stiffness, damping, inertia

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,6 +32,8 @@ _CHUNK = 1024
 # library keeps what is freed up to that size, where it would return every temporary array above
 # 128 KiB to the system and be handed it again, zeroed page by page, a quarter of the time.
 _KEPT = 1 << 24
+
+_T = TypeVar('_T')
 
 # Ground that does not move, under any number of columns of loads.
 _STILL = np.zeros((3, 1))
@@ -88,6 +91,28 @@ class CoupledModel:
         """All that turn on these blocks, in the order of the channels."""
         return (self.rotor,)
 
+    def in_order(self, own: _T, others: Sequence[_T]) -> tuple[_T, ...]:
+        """Put what is the machine's between what is its neighbours'."""
+        before = self.own_speeds.index(None)
+        return (*others[:before], own, *others[before:])
+
+    @property
+    def own_speeds(self) -> tuple[float | None, ...]:
+        """Speed at which each of them turns [rad/s]; None of the one that is asked about."""
+        return (None,)
+
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """What each of them is called; nothing where there is only one."""
+        return ('',)
+
+    @property
+    def own_seats(self) -> slice:
+        """Where the machine's own housings stand among those of all, by x and z of each."""
+        first = sum(2 * len(rotor.bearings)
+                    for rotor in self.rotors[:self.own_speeds.index(None)])
+        return slice(first, first + 2 * len(self.rotor.bearings))
+
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """All motions, in the order of the last axis of a Prediction."""
@@ -125,14 +150,10 @@ class CoupledModel:
         """All that holds the shaft."""
         return Bearings(self.rotor.bearings)
 
-    @cached_property
-    def nominal_springs(self) -> FloatArray:
-        """Isotropic stiffness that stands in for each bearing in the rotor's modes [N/m]."""
-        own = [bearing.nominal_stiffness for bearing in self.rotor.bearings]
-        # A bearing that is only a damper still has to hold the shaft in the modes.
-        shaft, _, _ = self.rotor.plane_matrices
-        least = 1e-3 * shaft.diagonal()[::2].max()
-        return np.array([spring if spring > 0.0 else least for spring in own])
+    @property
+    def all_bearings(self) -> Bearings:
+        """All that holds any shaft on these blocks."""
+        return self.bearings
 
     @cached_property
     def ports(self) -> list[int]:
@@ -144,7 +165,7 @@ class CoupledModel:
 
     @cached_property
     def _synchronous_modes(self) -> WhirlModes:
-        return WhirlModes.of(self.rotor, self.ports, springs=self.nominal_springs, order=1.0)
+        return WhirlModes.of(self.rotor, self.ports, springs=self.rotor.nominal_springs, order=1.0)
 
     def unbalance_response(self, speed: FloatArray, unbalance: ComplexArray) -> Prediction:
         """
@@ -234,7 +255,8 @@ class CoupledModel:
         """
         require(0.0 < order < math.inf, 'order', '> 0 and finite', order)
         speed = np.asarray(speed, dtype=float)
-        modes = WhirlModes.of(self.rotor, self.ports, springs=self.nominal_springs, order=order)
+        modes = WhirlModes.of(self.rotor, self.ports, springs=self.rotor.nominal_springs,
+                              order=order)
         displacement, force = self._respond(modes, order * speed, speed, self._unit_load(channel))
         return Response(self.channels, speed, order * speed, displacement[..., 0], force[..., 0])
 
@@ -299,7 +321,7 @@ class CoupledModel:
         displacement, force = self._unsolved(len(omega), loads.shape[1])
         for lag in np.unique(lags).tolist():
             rows = np.flatnonzero(lags == lag)
-            modes = WhirlModes.at(self.rotor, self.ports, springs=self.nominal_springs,
+            modes = WhirlModes.at(self.rotor, self.ports, springs=self.rotor.nominal_springs,
                                   speed=speed, highest=highest, lag=lag)
             displacement[rows], force[rows] = self._respond(
                 modes, omega[rows], np.full(len(rows), float(speed)), loads, ground)
@@ -360,7 +382,8 @@ class CoupledModel:
         for start in range(0, len(omega), _CHUNK):
             chunk = slice(start, start + _CHUNK)
             found = self._answer(modes, omega[chunk], speed[chunk], loads, ground)
-            displacement[chunk], force[chunk][:, self.transmits_force] = self._arrange(found)
+            displacement[chunk], force[chunk][:, self.transmits_force] = (
+                found.by_channel(self.rotors))
         if not np.all(np.isfinite(displacement)):
             raise NotSolvedError('the coupled system has no finite solution')
         return displacement, force
@@ -373,24 +396,4 @@ class CoupledModel:
         return answer(
             modes.receptance(omega), self.support.standing(omega), loads, ground=ground,
             bearings=self.bearings.dynamic_stiffness(omega, speed),
-            springs=np.repeat(self.nominal_springs, 2))
-
-    def _arrange(self, found: Answer) -> tuple[ComplexArray, ComplexArray]:
-        """Put the answer into the order of the channels."""
-        length, _, columns = found.blocks.shape
-
-        def interleave(journal: ComplexArray, housing: ComplexArray) -> ComplexArray:
-            pairs = (length, journal.shape[1] // 2, 2, columns)
-            both = np.stack([journal.reshape(pairs), housing.reshape(pairs)], axis=2)
-            return both.reshape(length, 2 * journal.shape[1], columns)
-
-        displacement, force, first = [], [], 0
-        for rotor, ports in zip(self.rotors, found.ports, strict=True):
-            seats, own = 2 * len(rotor.bearings), slice(first, first + 2 * len(rotor.bearings))
-            moved = np.concatenate([interleave(ports[:, :seats], found.housings[:, own]),
-                                    ports[:, seats:2 * len(rotor.stations)]], axis=1)
-            displacement.append(moved if rotor.view is None else rotor.view @ moved)
-            force.append(interleave(found.through[:, own], found.through[:, own]))
-            first = own.stop
-        return (np.concatenate([*displacement, found.blocks, found.ground], axis=1),
-                np.concatenate([*force, found.into_soil], axis=1))
+            springs=np.repeat(self.rotor.nominal_springs, 2))

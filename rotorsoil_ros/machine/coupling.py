@@ -1,5 +1,6 @@
 """How rotor, bearings, pedestals and blocks answer a force together."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.machine.standing import Standing
+from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.whirl import PortReceptance
 
 
@@ -38,6 +40,26 @@ class Answer:
     through: ComplexArray
     into_soil: ComplexArray
     ground: ComplexArray
+
+    def by_channel(self, rotors: Sequence[Rotor]) -> tuple[ComplexArray, ComplexArray]:
+        """Return motion of and force through the channels of rotors, blocks and ground."""
+        length, _, columns = self.blocks.shape
+
+        def interleave(journal: ComplexArray, housing: ComplexArray) -> ComplexArray:
+            pairs = (length, journal.shape[1] // 2, 2, columns)
+            both = np.stack([journal.reshape(pairs), housing.reshape(pairs)], axis=2)
+            return both.reshape(length, 2 * journal.shape[1], columns)
+
+        displacement, force, first = [], [], 0
+        for rotor, ports in zip(rotors, self.ports, strict=True):
+            seats, own = 2 * len(rotor.bearings), slice(first, first + 2 * len(rotor.bearings))
+            moved = np.concatenate([interleave(ports[:, :seats], self.housings[:, own]),
+                                    ports[:, seats:2 * len(rotor.stations)]], axis=1)
+            displacement.append(moved if rotor.view is None else rotor.view @ moved)
+            force.append(interleave(self.through[:, own], self.through[:, own]))
+            first = own.stop
+        return (np.concatenate([*displacement, self.blocks, self.ground], axis=1),
+                np.concatenate([*force, self.into_soil], axis=1))
 
 
 def answer(

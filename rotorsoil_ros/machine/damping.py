@@ -14,6 +14,7 @@ from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import CriticalSpeed
 from rotorsoil_ros.machine.support import Support
+from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.whirl import ORBITS
 from rotorsoil_ros.units import RADIANS_PER_TURN
@@ -136,21 +137,22 @@ class DampingSplitter:
     @cached_property
     def parts(self) -> tuple[tuple[str, str], ...]:
         """What may take energy, in the order of its columns."""
-        bearings = self.model.rotor.bearings
+        bearings = self.model.all_bearings.each
         soil = (SOIL,) if self._lossless is None else (RADIATION, MATERIAL)
         return (*((BEARINGS, bearing.name) for bearing in bearings),
                 *((PEDESTALS, bearing.name) for bearing in bearings
                   if bearing.pedestal is not None),
                 *((STRUCTURE, block.name) for block in self._bending),
                 *((kind, block.name) for kind in soil for block in self.model.foundations),
-                *((_OF_SHAFT[index], 'rotor') for index in self._losing))
+                *((_OF_SHAFT[index], name or 'rotor') for name, losing in zip(
+                    self.model.machines, self._losing, strict=True) for index in losing))
 
     @cached_property
-    def _losing(self) -> list[int]:
-        """Which of what the shaft may do it does."""
-        losses = self.model.rotor.losses
-        does = (False,) * len(_OF_SHAFT) if losses is None else losses.does
-        return [index for index, one in enumerate(does) if one]
+    def _losing(self) -> list[list[int]]:
+        """Which of what a shaft may do each does."""
+        every = [(False,) * len(_OF_SHAFT) if rotor.losses is None else rotor.losses.does
+                 for rotor in self.model.rotors]
+        return [[index for index, one in enumerate(does) if one] for does in every]
 
     def forced(self, speed: FloatArray, unbalance: ComplexArray) -> DampingSplit:
         """
@@ -166,16 +168,16 @@ class DampingSplitter:
         """
         model, support = self.model, self.model.support
         found = model.unbalance_response(speed, unbalance)
-        # Of a machine among others: they may come before it.
-        first = model.channels.index(model.rotor.channels[0])
-        seats = slice(first, first + 4 * len(model.rotor.bearings))
-        pairs = (len(speed), len(model.rotor.bearings), 2, 2)
+        seats = [place for rotor in model.rotors
+                 for place in model.channels.index(rotor.channels[0]) + np.arange(
+                     4 * len(rotor.bearings))]
+        pairs = (len(speed), len(seats) // 4, 2, 2)
         journal, housing = np.moveaxis(found.displacement[:, seats].reshape(pairs), 2, 0)
         through = found.force[:, seats].reshape(pairs)[:, :, 0]
         contacts = [model.channels.index(channel)
                     for part in support.members for channel in part.contacts]
         motion, into_soil = found.displacement[:, contacts], found.force[:, contacts]
-        flat = housing.reshape(len(speed), 2 * len(model.rotor.bearings))
+        flat = housing.reshape(len(speed), -1)
         below = through.reshape(flat.shape) + speed[:, None] ** 2 * (flat @ support.housing_mass)
         deflection = np.einsum('nij,nj->ni', support.pedestals(speed), below)
         own, arriving = support.pedestal_axes, ((flat - deflection).conj() * below).imag
@@ -191,44 +193,40 @@ class DampingSplitter:
     def _whirls(
         self, speed: FloatArray, unbalance: ComplexArray, journal: ComplexArray,
         through: ComplexArray,
-    ) -> ComplexArray:
-        """Return forward and backward motion of all nodes of the shaft, (2, n, 2 k)."""
-        model, losses = self.model, self.model.rotor.losses
-        if losses is None:
-            return np.zeros((2, len(speed), 0), dtype=complex)
-        # Springs that lose a little hold the shaft, at no speed in resonance; what they exert is
-        # taken off again.
-        springs = model.nominal_springs * (1.0 + 0.5j)
-        loads = (model.plane_forces @ unbalance).reshape(-1, 2)
-        exerted = springs[:, None] * journal - through
-        stiffness, mass, polar = model.rotor.plane_matrices
-        rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
-        square, found = speed[:, None] ** 2, []
-        for direction, orbit in zip(WHIRL_DIRECTIONS, ORBITS.conj(), strict=True):
-            held, rate = losses.following(direction, order=1.0)
-            dynamic = (stiffness + held + speed[:, None, None] * rate
-                       - square[..., None] * (mass - direction * polar))
-            force = np.zeros(dynamic.shape[:2], dtype=complex)
-            for port, load in zip(model.ports, loads @ orbit, strict=True):
-                force[:, port] += square[:, 0] * load
-            for index, row in enumerate(rows):
-                dynamic[:, row, row] += springs[index]
-                force[:, row] += exerted[:, index] @ orbit
-            found.append(np.linalg.solve(dynamic, force[..., None])[..., 0])
-        return np.array(found)
+    ) -> list[ComplexArray]:
+        """Return forward and backward motion of all nodes of every shaft, (2, n, 2 k) each."""
+        model, found, first = self.model, list[ComplexArray](), 0
+        for rotor, own in zip(model.rotors, model.own_speeds, strict=True):
+            seats = slice(first, first + len(rotor.bearings))
+            # Springs that lose a little hold the shaft, at no speed in resonance; what they
+            # exert is taken off again.
+            springs = rotor.nominal_springs * (1.0 + 0.5j)
+            force = np.zeros((len(speed), 2 * len(rotor.node_positions), 2), dtype=complex)
+            for bearing, exerted in zip(rotor.bearings, np.moveaxis(
+                    springs[:, None] * journal[:, seats] - through[:, seats], 1, 0), strict=True):
+                force[:, 2 * rotor.node_of(bearing.position)] += exerted
+            if own is None:
+                for port, load in zip(model.ports, (model.plane_forces @ unbalance).reshape(-1, 2),
+                                      strict=True):
+                    force[:, port] += speed[:, None] ** 2 * load
+            found.append(_whirl(rotor, speed, _turns(own, speed), springs, force))
+            first = seats.stop
+        return found
 
     def _lost(
-        self, speed: FloatArray, whirls: ComplexArray, w: ComplexArray | None = None,
+        self, speed: FloatArray, whirls: Sequence[ComplexArray], w: ComplexArray | None = None,
     ) -> FloatArray:
-        """Return Im(u^H F) of what the shaft does, (n, d)."""
-        losses = self.model.rotor.losses
-        if losses is None:
-            return np.zeros((len(speed), 0))
-        exerted = [losses.exerted(direction, motion, w=speed + 0j if w is None else w,
-                                  speed=speed)
-                   for direction, motion in zip(WHIRL_DIRECTIONS, whirls, strict=True)]
-        taken = (whirls.conj()[:, None] * exerted).imag.sum(axis=(0, 3))
-        return np.asarray(taken[self._losing].T)
+        """Return Im(u^H F) of what the shafts do, (n, d)."""
+        found = [np.zeros((len(speed), 0))]
+        for rotor, own, motions, losing in zip(
+                self.model.rotors, self.model.own_speeds, whirls, self._losing, strict=True):
+            if losing and rotor.losses is not None:
+                exerted = [rotor.losses.exerted(
+                    direction, motion, w=speed + 0j if w is None else w, speed=_turns(own, speed))
+                    for direction, motion in zip(WHIRL_DIRECTIONS, motions, strict=True)]
+                taken = (motions.conj()[:, None] * exerted).imag.sum(axis=(0, 3))
+                found.append(taken[losing].T)
+        return np.concatenate(found, axis=1)
 
     def of_modes(self, criticals: Sequence[CriticalSpeed]) -> list[DampingSplit | None]:
         """
@@ -266,10 +264,13 @@ class DampingSplitter:
     ) -> DampingSplit:
         model, support = self.model, self.model.support
         speed, blocks = np.array([critical.speed]), support.contacts
-        nodes = [model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
-        pairs = (1, len(nodes), 2)
-        gap = critical.deflection[nodes].ravel() - support.motion_rows @ critical.support
-        stiffness, damping, inertia = (part[0] for part in model.bearings.coefficients(
+        shapes = model.in_order((critical.deflection, critical.slope), critical.beside)
+        journals = np.concatenate([
+            deflection[[rotor.node_of(bearing.position) for bearing in rotor.bearings]]
+            for rotor, (deflection, _) in zip(model.rotors, shapes, strict=True)])
+        pairs = (1, len(journals), 2)
+        gap = journals.ravel() - support.motion_rows @ critical.support
+        stiffness, damping, inertia = (part[0] for part in model.all_bearings.coefficients(
             speed, speed))
         through = (stiffness + 1j * w * damping - w**2 * inertia) @ gap
         pressed = support.motion_spring @ critical.support
@@ -283,8 +284,9 @@ class DampingSplitter:
             gap.reshape(pairs), through.reshape(pairs), critical.support[None, axes],
             below[:, axes], motion, below[:, :blocks], radiated,
             [bent[own].sum(keepdims=True) for own in support.motions])
-        whirl = np.stack([critical.deflection, critical.slope], axis=1).reshape(-1, 2)
-        lost = self._lost(speed, (whirl @ ORBITS.conj().T).T[:, None], np.array([w]))
+        whirls = [(np.stack(shape, axis=1).reshape(-1, 2) @ ORBITS.conj().T).T[:, None]
+                  for shape in shapes]
+        lost = self._lost(speed, whirls, np.array([w]))
         return DampingSplit(speed, self.parts, np.concatenate([taken, lost], axis=1))
 
     def _taken(
@@ -310,6 +312,38 @@ class DampingSplitter:
         parts = np.split((motion.conj() * force).imag, ends[:-1], axis=1) if len(ends) else []
         return np.stack([part.sum(axis=1) for part in parts], axis=1) if parts else (
             np.zeros((len(motion), 0)))
+
+
+def _turns(own: float | None, speed: FloatArray) -> FloatArray:
+    """Return the speeds of a shaft, (n,) [rad/s]; without one of its own those asked about."""
+    return speed if own is None else np.full(len(speed), own)
+
+
+def _whirl(
+    rotor: Rotor, omega: FloatArray, turns: FloatArray, springs: ComplexArray,
+    force: ComplexArray,
+) -> ComplexArray:
+    """
+    Return forward and backward motion of a lossy shaft on springs, (2, n, 2 k).
+
+    Under forces over (x, z) of its rows, (n, 2 k, 2), at frequencies and rotor speeds (n,)
+    [rad/s]; nothing of a shaft that loses nothing.
+    """
+    if (losses := rotor.losses) is None:
+        return np.zeros((2, len(omega), 0), dtype=complex)
+    stiffness, mass, polar = rotor.plane_matrices
+    rows = [2 * rotor.node_of(bearing.position) for bearing in rotor.bearings]
+    w, speed = omega[:, None, None], turns[:, None, None]
+    found = []
+    for direction, orbit in zip(WHIRL_DIRECTIONS, ORBITS.conj(), strict=True):
+        lag = np.sign(w - speed) * (direction > 0)
+        dynamic = (stiffness + losses.held(direction, speed=0.0, lag=0.0)
+                   + speed * losses.turning(direction) + 1j * lag * losses.hysteretic
+                   + w * losses.rate(direction) - w**2 * mass + direction * w * speed * polar)
+        for row, spring in zip(rows, springs, strict=True):
+            dynamic[:, row, row] += spring
+        found.append(np.linalg.solve(dynamic, (force @ orbit)[..., None])[..., 0])
+    return np.array(found)
 
 
 def _is_passive(split: DampingSplit) -> bool:

@@ -97,7 +97,7 @@ def half_power_factors(
     model: CoupledModel, criticals: Sequence[CriticalSpeed],
 ) -> list[float]:
     """
-    Return the amplification factors by the response to unbalance that excites each mode most.
+    Return the amplification factors by the shaft's response to what excites each mode most.
 
     Parameters
     ----------
@@ -134,10 +134,8 @@ def _half_power_factor(
     forward = 0.5 * (critical.deflection[:, 1] + 1j * critical.deflection[:, 0])
     excites = np.zeros(len(model.planes), dtype=complex)
     excites[:len(rows)] = forward[rows]
-    blocks = {place.station for place in model.support.places}
-    shaft = [index for index, channel in enumerate(model.channels)
-             if channel.axis in ACROSS and channel.part != HOUSING
-             and channel.station not in blocks]
+    shaft = [model.channels.index(channel) for channel in model.rotor.channels
+             if channel.axis in ACROSS and channel.part != HOUSING]
     speed, size = _about(model, critical.speed, reach, excites)
     size = size[:, shaft]
     size = size[:, size[np.abs(speed - critical.speed).argmin()].argmax()]

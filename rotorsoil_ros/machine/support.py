@@ -41,8 +41,6 @@ class Support:
         The soil under each, or one `SharedGround` under all of them.
     place : Placement
         Where the shaft of the bearings lies.
-    burden : (6 f, 6 f) float array or None
-        Mass that rides on the foundations besides, on the rigid motion of each [kg].
 
     """
 
@@ -51,7 +49,6 @@ class Support:
     foundations: Sequence[Foundation]
     soil_models: Sequence[SoilModel]
     place: Placement = AT_ORIGIN
-    burden: FloatArray | None = None
 
     def __post_init__(self) -> None:
         _ = self.soils
@@ -200,9 +197,8 @@ class Support:
     @cached_property
     def block_mass(self) -> FloatArray:
         """Mass matrix of the rigid motion of all foundations, (6 f, 6 f)."""
-        own = np.asarray(scipy.linalg.block_diag(
+        return np.asarray(scipy.linalg.block_diag(
             np.zeros((0, 0)), *(part.mass for part in self.members)))
-        return own if self.burden is None else own + self.burden
 
     @property
     def block_rows(self) -> FloatArray:
@@ -300,11 +296,9 @@ class Support:
         """Mass matrix of the motion of the support, (s, s)."""
         rows = self.motion_rows
         total = np.asarray(rows.T @ self.housing_mass @ rows)
-        rigid = np.zeros((len(self.block_mass), self._size))
-        for index, (part, own) in enumerate(zip(self.members, self.motions, strict=True)):
+        for part, own in zip(self.members, self.motions, strict=True):
             total[own[:, None], own] += part.on_contacts.mass
-            rigid[6 * index:6 * index + 6, own] = part.on_contacts.rigid
-        return total if self.burden is None else total + rigid.T @ self.burden @ rigid
+        return total
 
     @cached_property
     def motion_spring(self) -> ComplexArray:

@@ -215,6 +215,15 @@ class Rotor:
         return stiffness, mass, polar
 
     @cached_property
+    def nominal_springs(self) -> FloatArray:
+        """Isotropic stiffness that stands in for each bearing in the rotor's modes [N/m]."""
+        own = [bearing.nominal_stiffness for bearing in self.bearings]
+        # A bearing that is only a damper still has to hold the shaft in the modes.
+        stiffness, _, _ = self.plane_matrices
+        least = 1e-3 * stiffness.diagonal()[::2].max()
+        return np.array([spring if spring > 0.0 else least for spring in own])
+
+    @cached_property
     def losses(self) -> Losses | None:
         """What shaft and discs do beside bending and swinging; None where they do nothing."""
         parts = self._parts

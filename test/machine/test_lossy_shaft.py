@@ -239,4 +239,4 @@ def test_torque_that_nothing_damps_feeds_a_whirl_as_the_full_eigenproblem_says()
     assert nearest.damping_ratio == pytest.approx(-worst.real / abs(worst), rel=1e-4)
     assert nearest.feeds[0].cause == 'torque'
     # What a torque takes at most bounds every one of them.
-    assert np.max(exact.real / np.abs(exact)) < _torque_feeds(model) < 0.5
+    assert np.max(exact.real / np.abs(exact)) < _torque_feeds(model.rotor) < 0.5

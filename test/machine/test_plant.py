@@ -12,7 +12,7 @@ from rotorsoil_ros.case import config
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, Soil
-from rotorsoil_ros.machine.coupled import CoupledModel, UNBALANCE_FORCE
+from rotorsoil_ros.machine.coupled import UNBALANCE_FORCE
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.neighbour import Neighbour
@@ -27,6 +27,7 @@ from machines import (
     channel,
     elastic_machine,
     paper_rotor,
+    renamed,
     Restrained,
     SOIL,
     Springs,
@@ -51,15 +52,6 @@ class WeighedBlock(Foundation):
     def mass_matrix(self):
         """The matrix."""
         return np.array(self.matrix).reshape(6, 6)
-
-
-def renamed(rotor, name, foundation=None):
-    """Return a rotor whose stations carry the name of their machine, on a block if one is told."""
-    def of(stations):
-        return tuple(replace(one, name=f'{name}_{one.name}') for one in stations)
-
-    return replace(rotor, discs=of(rotor.discs), probes=of(rotor.probes), bearings=tuple(
-        replace(one, foundation=foundation or one.foundation) for one in of(rotor.bearings)))
 
 
 @pytest.fixture(scope='module')
@@ -231,21 +223,6 @@ def test_machines_at_rest_shake_each_other_alike(fan):
         back = second.frequency_response(omega, speed=0.0, channel=f'fan_2_wheel_{there}')
         np.testing.assert_allclose(out[f'fan_2_wheel_{there}'].displacement,
                                    back[f'fan_1_wheel_{here}'].displacement, rtol=1e-8)
-
-
-def test_neighbour_far_from_all_frequencies_is_a_mass_on_the_block(fan):
-    """What modes are made of, neighbours as rigid bodies, is their rotor at low frequency."""
-    places = PLACES['facing']
-    model = fans(fan, places)
-    alone = CoupledModel(model.rotor, model.foundations, model.soil_models, place=model.place)
-    rigid = replace(alone)
-    rigid.__dict__['support'] = model.support
-    speed, moments = np.array([75.0]), [0.0, 1.0]
-    exact, as_body, without = (
-        channel(one, one.unbalance_response(speed, moments), 'block_x')
-        for one in (model, rigid, alone))
-    assert abs(as_body / exact - 1.0) < 2e-4  # its shaft and bearings give way a little
-    assert abs(without / exact - 1.0) > 5e-3
 
 
 def test_a_journal_at_rest_is_that_of_the_slowest_speed_known():

@@ -165,6 +165,11 @@ def dense_eigenvalues(
     k = scipy.linalg.block_diag(shaft, stiffness) + relative.T @ springs @ relative
     c = scipy.linalg.block_diag(speed * gyroscopic, damping) + relative.T @ dampers @ relative
     m = scipy.linalg.block_diag(mass, support.motion_mass) + relative.T @ inertia @ relative
+    return eigenvalues_of(k, c, m)
+
+
+def eigenvalues_of(k: FloatArray, c: FloatArray, m: FloatArray) -> ComplexArray:
+    """Return lambda with positive imaginary part of stiffness, damping and mass, rising."""
     # In units of time in which stiffness and mass are alike: digits.
     unit = np.sqrt(np.linalg.norm(k) / np.linalg.norm(m)) ** 0.5
     size, one = len(k), np.eye(len(k))

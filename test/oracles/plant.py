@@ -88,3 +88,58 @@ def dense_plant(blocks, compliance, machines, *, omega, source, load, ground=(0.
     solution = np.linalg.solve(matrix / scale[:, None], right / scale)
     return ([solution[part] for part in at[:count]],
             [solution[part] for part in at[count:2 * count]], solution[body])
+
+
+def plant_matrices(machines, blocks, *, stiffness, damping):
+    """
+    Return stiffness, damping and mass of several rotors on blocks on springs, assembled in full.
+
+    Parameters
+    ----------
+    machines, blocks
+        As `dense_plant`; what has no pedestal has its housing on the block itself.
+    stiffness, damping : (6 f, 6 f) arrays
+        Of the ground below the blocks [N/m], [N s/m].
+
+    """
+    sizes = [4 * len(rotor.node_positions) for rotor, _, _ in machines]
+    pedestals = [2 * sum(one.pedestal is not None for one in rotor.bearings)
+                 for rotor, _, _ in machines]
+    first = np.cumsum([0, *sizes, *pedestals]).tolist()
+    body = slice(first[-1], first[-1] + 6 * len(blocks))
+    k, c, m = (np.zeros((body.stop, body.stop)) for _ in range(3))
+    k[body, body], c[body, body] = stiffness, damping
+    names = [block.name for block in blocks]
+    for number, block in enumerate(blocks):
+        own = slice(body.start + 6 * number, body.start + 6 * number + 6)
+        m[own, own] = block.mass_matrix
+    for number, (rotor, (x, y, heading), speed) in enumerate(machines):
+        own, pedestal = slice(first[number], first[number + 1]), first[len(machines) + number]
+        springs, inertia, gyroscopic = rotor_matrices(rotor)
+        k[own, own] += springs
+        m[own, own] += inertia
+        c[own, own] += speed * gyroscopic
+        turn = np.array([[np.cos(heading), -np.sin(heading), 0.0],
+                         [np.sin(heading), np.cos(heading), 0.0], [0.0, 0.0, 1.0]])
+        for bearing in rotor.bearings:
+            block = blocks[names.index(bearing.foundation)]
+            place = (np.array([x, y, rotor.shaft_height]) + turn @ [0.0, bearing.position, 0.0]
+                     - [block.centre_x, block.centre_y, 0.0])
+            seat = np.zeros((2, body.stop))
+            begin = body.start + 6 * names.index(bearing.foundation)
+            for axis, along in enumerate((turn[:, 0], turn[:, 2])):
+                seat[axis, begin:begin + 6] = [*along, *np.cross(place, along)]
+            housing = seat
+            if bearing.pedestal is not None:
+                housing = np.eye(body.stop)[pedestal:pedestal + 2]
+                between, pedestal = housing - seat, pedestal + 2
+                k += between.T @ bearing.pedestal.stiffness @ between
+                c += between.T @ bearing.pedestal.damping @ between
+                m += housing.T @ bearing.pedestal.mass @ housing
+            node = own.start + 4 * rotor.node_of(bearing.position)
+            gap = np.eye(body.stop)[node:node + 2] - housing
+            for matrix, force in zip((k, c, m), bearing.coefficients(
+                    *2 * (np.array([speed]),)), strict=True):
+                matrix += gap.T @ force[0] @ gap
+    return k, c, m
+

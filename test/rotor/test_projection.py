@@ -38,7 +38,7 @@ def test_answers_are_those_of_all_elements(name, highest, speed, monkeypatch):
     model, force = MACHINES[name]
     omega = np.linspace(5.0, highest, 80)
     found = model.frequency_response(omega, speed=speed, channel=force).displacement
-    few = shapes_at_ports(*held(model.rotor, model.nominal_springs), model.ports,
+    few = shapes_at_ports(*held(model.rotor, model.rotor.nominal_springs), model.ports,
                           highest=highest, speed=speed)
     assert few.shape[1] < 0.2 * few.shape[0]
     monkeypatch.setattr(whirl, 'shapes_at_ports', lambda stiffness, *_, **__: np.eye(
@@ -60,7 +60,7 @@ def test_answers_at_ports_are_those_of_the_assembled_system():
 
 def test_shapes_do_not_multiply_with_the_elements():
     counts = [shapes_at_ports(
-        *held(model.rotor, model.nominal_springs), model.ports, highest=900.0,
+        *held(model.rotor, model.rotor.nominal_springs), model.ports, highest=900.0,
         speed=300.0).shape[1]
         for model in (paper_machine(elements=elements) for elements in (80, 160, 320))]
     assert max(counts) - min(counts) <= 3
@@ -70,7 +70,7 @@ def test_shapes_do_not_multiply_with_the_elements():
 @pytest.mark.parametrize('highest, speed', [(0.0, 300.0), (1e6, 0.0)])
 def test_all_shapes_are_kept_where_few_would_not_do(highest, speed):
     model = paper_machine(elements=60)
-    basis = shapes_at_ports(*held(model.rotor, model.nominal_springs), model.ports,
+    basis = shapes_at_ports(*held(model.rotor, model.rotor.nominal_springs), model.ports,
                             highest=highest, speed=speed)
     np.testing.assert_array_equal(basis, np.eye(len(basis)))
 
@@ -81,7 +81,7 @@ def test_slow_modes_at_rest_are_among_the_shapes():
         length=LENGTH, diameter=0.02, elements=120, material=STEEL,
         bearings=[bearing(name, place, stiffness=1e10, foundation=None)
                   for name, place in (('a', 0.0), ('b', LENGTH))]))
-    stiffness, mass, polar = held(model.rotor, model.nominal_springs)
+    stiffness, mass, polar = held(model.rotor, model.rotor.nominal_springs)
     basis = shapes_at_ports(stiffness, mass, polar, model.ports, highest=1000.0, speed=0.0)
     squares = np.linalg.eigvals(np.linalg.solve(basis.T @ stiffness @ basis,
                                                 basis.T @ mass @ basis)).real

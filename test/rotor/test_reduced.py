@@ -11,7 +11,7 @@ from rotorsoil_ros.rotor.whirl import held
 from machines import bearing, paper_machine, STEEL, two_blocks, uniform_rotor
 
 MODEL = paper_machine()
-SPRINGS = MODEL.nominal_springs
+SPRINGS = MODEL.rotor.nominal_springs
 
 
 def rows(model):
@@ -31,8 +31,8 @@ def test_few_shapes_have_the_whirl_of_all_of_them_at_any_speed():
 def test_few_shapes_bend_under_bearing_forces_as_the_whole_shaft_does():
     model = two_blocks()  # on three bearings: two would not bend it
     at = rows(model)
-    stiffness, _, _ = held(model.rotor, model.nominal_springs)
-    few = ReducedRotor.of(model.rotor, model.nominal_springs, count=2)
+    stiffness, _, _ = held(model.rotor, model.rotor.nominal_springs)
+    few = ReducedRotor.of(model.rotor, model.rotor.nominal_springs, count=2)
     np.testing.assert_allclose(few.shapes[at] @ few.shapes[at].T,
                                np.linalg.inv(stiffness)[np.ix_(at, at)], rtol=1e-9)
 

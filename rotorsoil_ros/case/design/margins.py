@@ -47,8 +47,10 @@ class SeparationMargin:
 
     @property
     def is_missed(self) -> bool:
-        """Whether unbalance excites this mode, and it is too near."""
-        is_excited = self.critical.whirl > 0 or math.isfinite(self.half_power_factor)
+        """Whether its own unbalance excites this mode, and it is too near."""
+        # A mode of a neighbour only as far as the machine's own shaft shows it.
+        is_excited = ((self.critical.whirl > 0 and not self.critical.owner)
+                      or math.isfinite(self.half_power_factor))
         return is_excited and self.margin < self.required
 
 

@@ -75,7 +75,7 @@ class Berth:
     ) -> SourceModel:
         """Return the machine among its neighbours as one system of equations."""
         return SourceModel(rotor, foundations, soil_models, couples, points, self.place,
-                           self.neighbours, self.index)
+                           self.neighbours, self.index, self.names)
 
     def seen(self, foundations: Sequence[Foundation]) -> tuple[Foundation, ...]:
         """Return where blocks lie in the axes of the shaft, as pictures show them; not turned."""

@@ -204,7 +204,7 @@ class FoundationPart:
         spring = part.T @ ((1.0 + 1j * loss)[:, None] * part)
         # The elastic coordinates' own unit springs belong to the compliance.
         spring[range(own, len(spring)), range(own, len(spring))] -= 1.0
-        return ContactForm(mass, spring, motion @ turn, turn[:6])
+        return ContactForm(mass, spring, motion @ turn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,15 +220,12 @@ class ContactForm:
         Stiffness beyond the unit springs, with what it loses.
     rows : (p, c + e) float array
         Motion of the points.
-    rigid : (6, c + e) float array
-        Mean rigid motion of the body.
 
     """
 
     mass: FloatArray
     spring: ComplexArray
     rows: FloatArray
-    rigid: FloatArray
 
 
 def _free_on_one(rows: FloatArray, elastic: FloatArray) -> FloatArray:

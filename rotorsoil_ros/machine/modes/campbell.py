@@ -28,6 +28,9 @@ class Campbell:
         lambda of exp(lambda t) [rad/s]; NaN where a speed has fewer modes.
     whirl : (n, m) int array
         +1 forward, -1 backward, 0 where there is no mode.
+    owner : (n, m) int array
+        Number of the neighbour, from 1 in the order of all machines, whose rotor has most of the
+        kinetic energy, and which turns at its own speed whatever this one does; 0 where none has.
     branch : (n, m) int array
         Which curve a mode belongs to, followed across speed by its shape; -1 where there is no
         mode.
@@ -40,6 +43,7 @@ class Campbell:
     speed: FloatArray
     eigenvalue: ComplexArray
     whirl: IntArray
+    owner: IntArray
     branch: IntArray
     untold: FloatArray
 
@@ -96,7 +100,8 @@ def campbell(model: CoupledModel, speeds: FloatArray, count: int) -> Campbell:
     if not count >= 1:
         raise RotorSoilError(f'count must be at least 1 mode, got {count}')
     found = SpectrumSolver.lowest(model, speeds, count)
-    return Campbell(speeds, 1j * found.frequency, found.whirl, follow(found), found.untold)
+    return Campbell(speeds, 1j * found.frequency, found.whirl, found.owner, follow(found),
+                    found.untold)
 
 
 def follow(found: Spectrum) -> IntArray:

@@ -48,17 +48,22 @@ class CriticalSpeed:
     speed : float
         omega = Omega [rad/s].
     whirl : int
-        +1 forward, which unbalance excites; -1 backward.
+        +1 where its own rotor whirls forward, which unbalance excites; -1 backward.
     damping_ratio : float
         Of the mode [-].
     deflection : (k, 2) complex array
-        Its shape over (x, z) of the rotor's nodes, the largest amplitude being one; where the
-        rotor stays still, that of the support is.
+        Its shape over (x, z) of the rotor's nodes, the largest amplitude of any rotor being one;
+        where all stay still, that of the support is.
     slope : (k, 2) complex array
         Of the shaft in the same shape, in the planes of x and z.
     support : (s,) complex array
         Motion of the support in the same shape, over (x, y, z, rx, ry, rz) of each block, then
         the deflections of pedestals.
+    beside : tuple of two (k, 2) complex arrays
+        Deflection and slope of each neighbour's rotor in the same shape.
+    owner : int
+        Number of the neighbour, from 1 in the order of all machines, whose rotor has most of the
+        kinetic energy; 0 where none has.
 
     """
 
@@ -68,6 +73,8 @@ class CriticalSpeed:
     deflection: ComplexArray
     slope: ComplexArray
     support: ComplexArray
+    beside: tuple[tuple[ComplexArray, ComplexArray], ...] = ()
+    owner: int = 0
 
     @property
     def speed_rpm(self) -> float:
@@ -148,7 +155,7 @@ def critical_speeds(
                              f'{high:g}')
     solver = SpectrumSolver.up_to(model, _ABOVE * high, following=True)
     # What there is to be solved for grows with the cube of them.
-    if int((solver.basis.mass * high**2 > 1.0).sum()) > _MOST_SLOW:
+    if solver.shafts.own.slow(high) > _MOST_SLOW:
         raise NotSolvedError(
             f'the rotor bends in more than {_MOST_SLOW} ways below {rad_s_to_rpm(high):g} rpm, '
             'more than can be told apart: is it so soft?')
@@ -249,10 +256,15 @@ def _critical(
     solver: SpectrumSolver, found: Spectrum, speed: float, row: int, mode: int,
 ) -> CriticalSpeed:
     frequency, support = found.frequency[row, mode], found.support[row, mode]
-    deflection, slope = solver.bent(found.rotor[row, mode])
-    largest = np.abs(deflection).max()
+    rotor, shafts = found.rotor[row, mode], solver.shafts
+    own = shafts.each.index(shafts.own)
+    forward, backward = shafts.kinetic(rotor[:, None])[:, own]
+    shapes = list(shafts.bent(rotor))
+    largest = max(np.abs(deflection).max() for deflection, _ in shapes)
     if not largest > _STILL * np.abs(support).max(initial=0.0):
         largest = np.abs(support).max()
-    return CriticalSpeed(speed, int(found.whirl[row, mode]),
-                         float(frequency.imag / np.abs(frequency)),
-                         deflection / largest, slope / largest, support / largest)
+    scaled = [(deflection / largest, slope / largest) for deflection, slope in shapes]
+    deflection, slope = scaled.pop(own)
+    return CriticalSpeed(speed, 1 if forward >= backward else -1,
+                         float(frequency.imag / np.abs(frequency)), deflection, slope,
+                         support / largest, tuple(scaled), int(found.owner[row, mode]))

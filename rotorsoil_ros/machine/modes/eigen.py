@@ -63,6 +63,10 @@ class FreeVibration:
         What bends of its foundations; forces act on it where they act on the housings.
     within : tuple of two (n,) float arrays
         Frequencies between which all this holds [rad/s].
+    shafts : tuple of (slice, int array)
+        Which of the bearings, and of the modes forward then backward, are those of each shaft.
+    slow : int
+        So many motions of the rotors on their real bearings are within `reach`.
 
     """
 
@@ -78,6 +82,8 @@ class FreeVibration:
     highest: float
     reach: float
     within: tuple[FloatArray, FloatArray]
+    shafts: tuple[tuple[slice, IntArray], ...]
+    slow: int
 
     @cached_property
     def _modes(self) -> tuple[AnyArray, ComplexArray, ComplexArray]:
@@ -105,6 +111,9 @@ class FreeVibration:
     def resonant(self) -> IntArray:
         """Rotor modes that may resonate, (n, k): they are unknowns of their own."""
         count = int((self._slowness * self.highest * self.reach > 1.0).sum(axis=1).max())
+        # Where a bearing is softer one way than its nominal spring a forward and a backward one
+        # make what is slow there.
+        count = min(count + 2 * max(self.slow - count, 0), self._slowness.shape[1])
         return np.argsort(-self._slowness, axis=1)[:, :count]
 
     def _pick(
@@ -116,10 +125,25 @@ class FreeVibration:
                 np.take_along_axis(driven, modes[:, :, None], axis=1))
 
     @cached_property
-    def _residues(self) -> ComplexArray:
+    def _residues(self) -> list[ComplexArray]:
+        """Of each shaft, (n, m, 4 b^2): no mode moves the journals of another."""
         _, orbits, driven = self._modes
-        pairs = orbits.transpose(0, 2, 1)[..., None] * driven[:, :, None]
-        return pairs.reshape(*pairs.shape[:2], -1)
+        found: list[ComplexArray] = []
+        for seats, modes in self.shafts:
+            ports = slice(2 * seats.start, 2 * seats.stop)
+            pairs = (orbits[:, ports, modes].transpose(0, 2, 1)[..., None]
+                     * driven[:, modes, None, ports])
+            found.append(pairs.reshape(*pairs.shape[:2], -1))
+        return found
+
+    def _summed(self, weights: AnyArray) -> ComplexArray:
+        """Return the journals' receptance by modes of weights (n, p, m), (n, p, 2 b, 2 b)."""
+        total = np.zeros((*weights.shape[:2], len(self.rows), len(self.rows)), dtype=complex)
+        for (seats, modes), residues in zip(self.shafts, self._residues, strict=True):
+            ports, count = slice(2 * seats.start, 2 * seats.stop), 2 * (seats.stop - seats.start)
+            flat = weights[..., modes] @ residues
+            total[..., ports, ports] = flat.reshape(*weights.shape[:2], count, count)
+        return total
 
     def _gains(self, frequency: ComplexArray) -> ComplexArray:
         """Return 1 / (1 - w / omega_k) of modes that cannot resonate, else 0, (n, p, m)."""
@@ -127,12 +151,6 @@ class FreeVibration:
         stiffness = 1.0 - frequency[..., None] * inverse[:, None]
         np.put_along_axis(stiffness, self.resonant[:, None], np.inf, axis=2)
         return np.asarray(1.0 / stiffness)
-
-    def _regular(self, frequency: ComplexArray) -> ComplexArray:
-        """Return the journals' receptance by those modes, (n, p, 2 b, 2 b)."""
-        ports = len(self.rows)
-        flat = self._gains(frequency) @ self._residues
-        return np.asarray(flat.reshape(*frequency.shape, ports, ports))
 
     def _moves(
         self, frequency: ComplexArray,
@@ -145,7 +163,8 @@ class FreeVibration:
         _, orbits, _ = self._pick(self.resonant)
         ports = len(self.rows)
         gives, bent, mass = self.elastic.follows(frequency)
-        rows, less = self.rows + bent, self._regular(frequency) - np.eye(ports)
+        rows, less = self.rows + bent, self._summed(
+            self._gains(frequency)) - np.eye(ports)
         gap = np.concatenate([
             -np.eye(ports) - less + less @ gives,
             np.broadcast_to(orbits[:, None], (*frequency.shape, *orbits.shape[1:])),
@@ -247,13 +266,13 @@ class FreeVibration:
     def _slow(self) -> tuple[IntArray, ComplexArray, ComplexArray, ComplexArray]:
         """Modes that are slow in either sense, (n, 2 k), and what others do, (n, 2 b, 2 b)."""
         inverse, _, _ = self._modes
-        count, ports = self.resonant.shape[1], len(self.rows)
+        count = self.resonant.shape[1]
         order = np.argsort(-self._slowness, axis=1)
         slow = np.concatenate([self.resonant, order[:, order.shape[1] - count:]], axis=1)
         others = np.ones(inverse.shape)
         np.put_along_axis(others, slow, 0.0, axis=1)
         powers = others[:, None] * inverse[:, None] ** np.arange(3)[:, None]
-        moments = (powers @ self._residues).reshape(-1, 3, ports, ports)
+        moments = self._summed(powers)
         return slow, moments[:, 0], moments[:, 1], moments[:, 2]
 
     def guesses(self, count: int) -> tuple[ComplexArray, ComplexArray]:

@@ -11,6 +11,7 @@ import scipy.linalg
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
+from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.rotor.coefficients import Coefficients, FrequencyTable, SpeedTable, tables
 from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
@@ -21,6 +22,9 @@ _ROUND_OFF = 1e-12
 
 # The soil is passive: what seems to give more than this of all power is a slip of its fit.
 _ARTEFACT = 1e-3
+
+# What gives less than this share of all power gives nothing.
+_NOTHING = 1e-9
 
 # A torque, and the cross terms of a seal's mass, may feed modes of any frequency: they are looked
 # for up to so many times the highest speed.
@@ -92,23 +96,24 @@ def highest_fed(model: CoupledModel, span: tuple[float, float]) -> float:
     terms. With s > 0 a bearing can only balance it while |l| c < |q| + max(-k, 0).
 
     """
-    highest = _of_shaft(model, span[1])
-    for stiffness, damping, inertia in _of_everything(model, span):
+    highest = max(_of_shaft(rotor, span[1] if own is None else own)
+                  for rotor, own in zip(model.rotors, model.own_speeds, strict=True))
+    for fastest_speed, (stiffness, damping, inertia) in _of_everything(model, span):
         lowest = damping.lowest_eigenvalue
         gives = stiffness.skew + max(-stiffness.lowest_eigenvalue, 0.0)
         if _gives(inertia):
-            highest = max(highest, BOUNDLESS * span[1])
+            highest = max(highest, BOUNDLESS * fastest_speed)
         if gives > 0.0 or lowest < 0.0:
             highest = max(highest, gives / lowest if lowest > 0.0 else math.inf)
     return highest
 
 
-def _of_shaft(model: CoupledModel, fastest_speed: float) -> float:
+def _of_shaft(rotor: Rotor, fastest_speed: float) -> float:
     """Return below which |lambda| a growing vibration lies that the shaft feeds [rad/s]."""
-    losses = model.rotor.losses
+    losses = rotor.losses
     if losses is None:
         return 0.0
-    if _torque_feeds(model) > 0.0:
+    if _torque_feeds(rotor) > 0.0:
         return BOUNDLESS * fastest_speed
     # Material feeds a whirl that is slower than the rotor; it grows by its loss factor at most.
     return (1.0 + float(losses.is_hysteretic)) * fastest_speed * bool(
@@ -121,25 +126,25 @@ def _gives(inertia: _Range) -> bool:
 
 def boundless(model: CoupledModel, span: tuple[float, float]) -> str:
     """Return what may feed a mode of any frequency; nothing where all of it is bounded."""
-    if _torque_feeds(model) > _FELT:
+    if any(_torque_feeds(rotor) > _FELT for rotor in model.rotors):
         return 'the torque'
-    heavy = any(_gives(inertia) for _, _, inertia in _of_everything(model, span))
+    heavy = any(_gives(inertia) for _, (_, _, inertia) in _of_everything(model, span))
     return 'the mass of a seal' if heavy else ''
 
 
-def _torque_feeds(model: CoupledModel) -> float:
+def _torque_feeds(rotor: Rotor) -> float:
     """
     Return which damping ratio a torque takes from a mode at most.
 
     It gives by its symmetric part alone, at the slopes of its ends. Of a motion of unit strain
     energy these are what couples there bend.
     """
-    losses = model.rotor.losses
+    losses = rotor.losses
     if losses is None or not losses.torsion.any():
         return 0.0
     giving = 0.5 * (losses.torsion + losses.torsion.T)
     rows = np.flatnonzero(np.abs(giving).max(axis=0) > _CANCELLED * np.abs(losses.torsion).max())
-    stiffness, _, _ = held(model.rotor, model.nominal_springs)
+    stiffness, _, _ = held(rotor, rotor.nominal_springs)
     bent = scipy.linalg.cho_solve(scipy.linalg.cho_factor(stiffness),
                                   np.eye(len(stiffness))[:, rows])[rows]
     values = scipy.linalg.eigvals(bent @ giving[np.ix_(rows, rows)])
@@ -147,26 +152,30 @@ def _torque_feeds(model: CoupledModel) -> float:
 
 
 def fastest(model: CoupledModel) -> float:
-    """Return a frequency above all modes of the rotor's mesh [rad/s]."""
-    stiffness, mass, _ = held(model.rotor, model.nominal_springs)
-    values = scipy.linalg.eigh(mass, stiffness, eigvals_only=True)
-    return float(2.0 / math.sqrt(values[values > _MASSLESS * values[-1]].min()))
+    """Return a frequency above all modes of the rotors' meshes [rad/s]."""
+    found = 0.0
+    for rotor in model.rotors:
+        stiffness, mass, _ = held(rotor, rotor.nominal_springs)
+        values = scipy.linalg.eigh(mass, stiffness, eigvals_only=True)
+        found = max(found, 2.0 / math.sqrt(values[values > _MASSLESS * values[-1]].min()))
+    return found
 
 
 def _of_everything(
     model: CoupledModel, span: tuple[float, float],
-) -> Iterator[tuple[_Range, _Range, _Range]]:
+) -> Iterator[tuple[float, tuple[_Range, _Range, _Range]]]:
+    """Yield the highest speed and the coefficients of all that holds a shaft."""
     none = np.zeros((2, 2))
-    for bearing in model.rotor.bearings:
-        points = np.sort(np.concatenate([np.array(span), knots(bearing, span)]))
+    for bearing, turns in model.all_bearings.between(span):
+        points = np.sort(np.concatenate([np.array(turns), knots(bearing, turns)]))
         for left, right in pairwise(points.tolist()):
             stiffness, damping, inertia = (_between(matrix, left, right)
                                            for matrix in bearing.matrices)
-            yield stiffness, damping, inertia
+            yield turns[1], (stiffness, damping, inertia)
         if bearing.pedestal is not None:
             stiffness, damping = (_Range(matrix, matrix) for matrix in (
                 bearing.pedestal.stiffness, bearing.pedestal.damping))
-            yield stiffness, damping, _Range(none, none)
+            yield turns[1], (stiffness, damping, _Range(none, none))
 
 
 def _between(matrix: Coefficients, left: float, right: float) -> _Range:
@@ -197,7 +206,7 @@ class Feed:
     Attributes
     ----------
     name : str
-        Of the bearing, or `the pedestal of` it, or `the shaft`.
+        Of the bearing, or `the pedestal of` it, or `the shaft` (`of` a machine among others).
     share : float
         Of all that is given [-].
     cause : str
@@ -217,28 +226,33 @@ def feeds(pencil: Pencil, vibrations: Vibrations, index: int) -> tuple[Feed, ...
     rotor, support, load = (pencil.part(vibrations, index, name)
                             for name in ('rotor', 'support', 'load'))
     gap = pencil.journals @ rotor - pencil.rows @ support
-    model, blocks = pencil.model, pencil.model.support.contacts
+    model, shafts = pencil.model, pencil.solver.shafts
+    blocks, asked = model.support.contacts, (vibrations.speed,) * 2
     terms: list[tuple[str, tuple[str, ...], FloatArray]] = [
-        (bearing.name, _OF_BEARING, _taken(w, gap[pair], bearing, vibrations.speed) / spring)
-        for bearing, spring, pair in zip(model.rotor.bearings, model.nominal_springs.tolist(),
-                                         _pairs(0), strict=False)]
+        (bearing.name, _OF_BEARING, _taken(w, gap[pair], bearing, speed) / spring)
+        for (bearing, (speed, _)), spring, pair in zip(
+            model.all_bearings.between(asked), shafts.springs.tolist(), _pairs(0), strict=False)]
     deflection = support * pencil.size
     terms += [(f'the pedestal of {bearing.name}', _OF_BEARING, _passive(
         w, deflection[pair], bearing.pedestal.stiffness, bearing.pedestal.damping))
-        for bearing, pair in zip((one for one in model.rotor.bearings
+        for bearing, pair in zip((one for one in model.all_bearings.each
                                   if one.pedestal is not None), _pairs(blocks), strict=False)
         if bearing.pedestal is not None]
-    if (losses := pencil.solver.basis.losses) is not None:
-        own = [(motion.conj() * losses.exerted(
-            way, motion[None], w=np.array([w]), speed=np.array([vibrations.speed]))[:, 0])
-            for way, motion in zip(WHIRL_DIRECTIONS, rotor.reshape(2, -1), strict=True)]
-        terms.append(('the shaft', _OF_SHAFT, (np.conj(1j * w) * np.sum(own, axis=(0, 2))).real))
+    for one, rows, name in zip(shafts.each, shafts.rows, model.machines, strict=True):
+        if (losses := one.basis.losses) is not None:
+            speed = np.array([vibrations.speed if one.speed is None else one.speed])
+            own = [(motion.conj() * losses.exerted(
+                way, motion[None], w=np.array([w]), speed=speed)[:, 0])
+                for way, motion in zip(WHIRL_DIRECTIONS, rotor.reshape(2, -1)[:, rows],
+                                       strict=True)]
+            terms.append((f'the shaft of {name}' if name else 'the shaft', _OF_SHAFT,
+                          (np.conj(1j * w) * np.sum(own, axis=(0, 2))).real))
     soil = float((np.conj(1j * w) * np.vdot(support[:blocks], load[:blocks])).real)
     total = sum(float(np.abs(taken).sum()) for _, _, taken in terms)
     if not total > 0.0 or soil < -_ARTEFACT * (total + abs(soil)):
         return ()
     given = [(name, -float(taken.sum()), causes[int(taken.argmin())])
-             for name, causes, taken in terms if taken.sum() < 0.0]
+             for name, causes, taken in terms if taken.sum() < -_NOTHING * total]
     whole = sum(power for _, power, _ in given)
     return tuple(Feed(name, power / whole, cause) for name, power, cause
                  in sorted(given, key=lambda one: -one[1]))

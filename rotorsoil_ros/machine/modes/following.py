@@ -38,7 +38,7 @@ _CROSSING = 0.25
 def first_speeds(model: CoupledModel, span: tuple[float, float]) -> FloatArray:
     """Return speeds to begin with: between neighbours every coefficient is smooth."""
     speeds = [np.linspace(*span, _FIRST_SPEEDS)]
-    speeds += [knots(bearing, span) for bearing in model.rotor.bearings]
+    speeds += [knots(bearing, span) for bearing in model.all_bearings.following]
     return np.unique(np.concatenate(speeds))
 
 

@@ -48,8 +48,10 @@ def lowest_natural_frequency(model: CoupledModel, *, axis: str, highest: float) 
     machine and support in the direction of measurement; shaft bending is none of it.
 
     """
-    frequency, motion = natural_frequencies(model.support, riding_mass(model.rotor), highest)
-    power = np.abs(motion).reshape(len(motion), len(model.rotor.bearings), 2) ** 2
+    riding = scipy.linalg.block_diag(*map(riding_mass, model.rotors))
+    frequency, motion = natural_frequencies(model.support, riding, highest)
+    own = motion[:, model.own_seats]
+    power = np.abs(own).reshape(len(own), len(model.rotor.bearings), 2) ** 2
     total = power.sum(axis=(1, 2))
     # A block that slides along the shaft moves no housing across it, but for round-off.
     moves = ((power[..., ACROSS.index(axis)].sum(axis=1) >= _IN_DIRECTION * total)

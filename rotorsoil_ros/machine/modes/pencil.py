@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.continuation import Continuation
@@ -12,7 +11,6 @@ from rotorsoil_ros.ground.rational import States
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.machine.modes.zones import Zone
-from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
 from rotorsoil_ros.rotor.whirl import ORBITS
 
 # Poles of the soil that weigh less than this are noise of their fit: each would be a mode.
@@ -56,7 +54,7 @@ class Pencil:
     """
     Linear eigenproblem A(speed) y = w B y, in coordinates that do not turn with the speed.
 
-    The unknowns are the rotor's coordinates in forward and backward whirl and their rates, the
+    The unknowns are the rotors' coordinates in forward and backward whirl and their rates, the
     motion z of the support and its rate, the forces p on its massless compliance, and the states
     of that, z = N(w) p; beside it what bends has a stiffness K, so that p = f + (w^2 M - K) z.
     Bearing springs are in units of their nominal ones.
@@ -122,18 +120,20 @@ class Pencil:
     @cached_property
     def journals(self) -> ComplexArray:
         """Motion of the journals per coordinate of the rotor, (2 b, 2 r)."""
-        model, basis = self.model, self.solver.basis
-        rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
-        own = np.sqrt(model.nominal_springs)[:, None] * basis.shapes[rows]
+        own = self.solver.shafts.journals
         turned = own[:, None, None, :] * ORBITS.T[None, :, :, None]
-        return np.asarray(turned.reshape(2 * len(rows), 2 * len(basis.mass)))
+        return np.asarray(turned.reshape(2 * own.shape[0], 2 * own.shape[1]))
 
     @cached_property
     def rows(self) -> FloatArray:
         """Motion of the housings per motion of the support, (2 b, s)."""
-        unit = np.repeat(np.sqrt(self.model.nominal_springs), 2)
-        return np.asarray(unit[:, None] * self.model.support.motion_rows
+        return np.asarray(self._unit_spring[:, None] * self.model.support.motion_rows
                           * self.size)
+
+    @cached_property
+    def _unit_spring(self) -> FloatArray:
+        """Root of the nominal stiffness along x and z of every bearing, (2 b,)."""
+        return np.repeat(np.sqrt(self.solver.shafts.springs), 2)
 
     @cached_property
     def mass(self) -> FloatArray:
@@ -159,8 +159,8 @@ class Pencil:
 
     def springs(self, speed: FloatArray) -> ComplexArray:
         """Return the terms a, b and c of `Bearings.series` in `unit`, (3, n, 2 b, 2 b)."""
-        unit = np.repeat(np.sqrt(self.model.nominal_springs), 2)
-        series = np.array(self.model.bearings.series(speed, self.zone.between))
+        unit = self._unit_spring
+        series = np.array(self.model.all_bearings.series(speed, self.zone.between))
         powers = self.unit ** np.arange(3.0)[:, None, None, None]
         return np.asarray(powers * series / (unit[:, None] * unit))
 
@@ -170,7 +170,7 @@ class Pencil:
         at, size = self.places, self.places['soil'].stop
         b = np.zeros((size, size), dtype=complex)
         rotor, rate = at['rotor'], at['rotor_rate']
-        b[rotor, rate] = self.unit * np.diag(np.tile(self.solver.basis.mass, 2))
+        b[rotor, rate] = self.unit * np.diag(np.tile(self.solver.shafts.mass, 2))
         b[rate, rotor] = np.eye(rate.stop - rate.start)
         b[at['load'], at['support_rate']] = self.unit * self.mass
         b[at['support_rate'], at['support']] = np.eye(len(self.mass))
@@ -184,11 +184,10 @@ class Pencil:
         a = np.zeros((size, size), dtype=complex)
         a[at['rotor'], at['rotor']] = (np.eye(self.journals.shape[1])
                                        - self.journals.conj().T @ self.journals)
-        if (losses := self.solver.basis.losses) is not None:
-            held = [losses.held(way, speed=0.0, lag=self.zone.lag) for way in WHIRL_DIRECTIONS]
-            rates = [self.unit * losses.rate(way) for way in WHIRL_DIRECTIONS]
-            a[at['rotor'], at['rotor']] += scipy.linalg.block_diag(*held)
-            a[at['rotor'], at['rotor_rate']] += scipy.linalg.block_diag(*rates)
+        held, rate, _ = self._losses
+        polar, _ = self.solver.shafts.gyroscopic()
+        a[at['rotor'], at['rotor']] += held
+        a[at['rotor'], at['rotor_rate']] += self.unit * (rate + _opposite(polar))
         a[at['rotor_rate'], at['rotor_rate']] = self.unit * np.eye(self.journals.shape[1])
         a[at['load'], at['load']] = np.eye(len(self.mass))
         a[at['load'], at['support']] = self._spring
@@ -204,13 +203,15 @@ class Pencil:
     @cached_property
     def _turning(self) -> ComplexArray:
         """Gyroscopic part of A per speed."""
-        at, polar = self.places, self.solver.basis.polar
-        a = np.zeros_like(self._fixed)
-        a[at['rotor'], at['rotor_rate']] = self.unit * np.kron(np.diag([1.0, -1.0]), polar)
-        if (losses := self.solver.basis.losses) is not None:
-            turning = [losses.turning(way) for way in WHIRL_DIRECTIONS]
-            a[at['rotor'], at['rotor']] = scipy.linalg.block_diag(*turning)
+        at, a = self.places, np.zeros_like(self._fixed)
+        _, polar = self.solver.shafts.gyroscopic()
+        _, _, a[at['rotor'], at['rotor']] = self._losses
+        a[at['rotor'], at['rotor_rate']] = self.unit * _opposite(polar)
         return a
+
+    @cached_property
+    def _losses(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        return self.solver.shafts.losses(self.zone.middle, self.zone.lag)
 
     def _bearings(self, series: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return what bearings of these terms, (3, n, 2 b, 2 b), make of A and of B."""
@@ -231,7 +232,7 @@ class Pencil:
 
     def _matrices(self, speed: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Return A, B, and their derivatives by the speed as (A', B'), (n, d, d) each."""
-        bearings = self.model.rotor.bearings
+        bearings = self.model.all_bearings.following
         low = max([0.0, *(bearing.speed_range[0] for bearing in bearings)])
         high = min(bearing.speed_range[1] for bearing in bearings)
         step = _STEP * max(float(speed.max()), self.unit)
@@ -283,6 +284,11 @@ class Pencil:
     def part(self, found: Vibrations, index: int, name: str) -> ComplexArray:
         """Return the named unknowns of one vibration."""
         return np.asarray(found.vector[index, self.places[name]])
+
+
+def _opposite(polar: FloatArray) -> FloatArray:
+    """Return gyroscopic couples over forward and backward motions, which they tell apart."""
+    return np.asarray(np.kron(np.diag([1.0, -1.0]), polar))
 
 
 def _joined(parts: tuple[Vibrations, ...]) -> Vibrations:

@@ -5,7 +5,6 @@ from functools import cached_property
 import math
 
 import numpy as np
-import scipy.linalg
 
 from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
@@ -14,23 +13,13 @@ from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
 from rotorsoil_ros.machine.modes.elastic import Elastic
+from rotorsoil_ros.machine.modes.shafts import MORE_SHAPES, ShaftLine, Shafts
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of
-from rotorsoil_ros.rotor.losses import Losses, WHIRL_DIRECTIONS
-from rotorsoil_ros.rotor.reduced import ReducedRotor, Whirls
-from rotorsoil_ros.rotor.whirl import held, ORBITS
+from rotorsoil_ros.rotor.reduced import Whirls
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
-# A shaft at rest whirls in no direction; one that creeps, relative to its lowest mode, does.
-_CREEP = 1e-9
-
-# Speeds that are solved together: bounds memory.
+# Speeds that are solved together, of a machine alone: bounds memory.
 _CHUNK = 64
-
-# Modes at rest beyond those wanted that span the rotor's shapes.
-_MORE_SHAPES = 6
-
-# Ratio of a mode's 1 / omega to the largest below which it is round-off.
-_MASSLESS = 1e-6
 
 # Relative error of a frequency that the subspace may cause.
 _DEFECT = 1e-8
@@ -57,11 +46,14 @@ class Spectrum:
     frequency : (n, p) complex array
         w = lambda / i [rad/s]: damped frequency + i decay, ascending in frequency.
     whirl : (n, p) int array
-        +1 where the rotor's kinetic energy is that of a forward orbit, else -1.
+        +1 where the rotors' kinetic energy is that of a forward orbit, else -1.
+    owner : (n, p) int array
+        Number of the neighbour, from 1 in the order of all machines, whose rotor has most of the
+        kinetic energy; 0 where none has.
     shape : (n, p, d) complex array
         Coordinates in which the kinetic energy is the sum of squares; the same at all speeds.
     rotor : (n, p, 2, r) complex array
-        Shape of the rotor, forward and backward, in its reduced coordinates.
+        Shape of the rotors, forward and backward, in their reduced coordinates.
     support : (n, p, s) complex array
         Motion of the support, over the columns of `Support.motion_rows`.
     untold : (n,) float array
@@ -72,6 +64,7 @@ class Spectrum:
 
     frequency: ComplexArray
     whirl: IntArray
+    owner: IntArray
     shape: ComplexArray
     rotor: ComplexArray
     support: ComplexArray
@@ -87,8 +80,8 @@ class SpectrumSolver:
     ----------
     model : CoupledModel
         The machine.
-    basis : ReducedRotor
-        Its rotor in a subspace.
+    shafts : Shafts
+        Its rotor in a subspace, and those of its neighbours.
     pieces : tuple of Continuation
         Compliance of the support without its mass, between the branch points of the soil.
     span : tuple of two floats
@@ -100,15 +93,14 @@ class SpectrumSolver:
     """
 
     model: CoupledModel
-    basis: ReducedRotor
+    shafts: Shafts
     pieces: tuple[Continuation, ...]
     span: tuple[float, float]
     following: bool = False
 
     @classmethod
     def up_to(
-        cls, model: CoupledModel, highest: float, *, shapes: int = _MORE_SHAPES,
-        following: bool = False,
+        cls, model: CoupledModel, highest: float, *, shapes: int = 0, following: bool = False,
     ) -> 'SpectrumSolver':
         """
         Prepare for modes up to a frequency, as far as the soil is known.
@@ -120,32 +112,29 @@ class SpectrumSolver:
         highest : float
             Frequency [rad/s].
         shapes : int
-            Least number of modes at rest that span the rotor's shapes.
+            Least number of modes at rest that span the shapes of each rotor.
         following : bool
             As of the solver.
 
         """
-        while True:
-            basis = ReducedRotor.of(model.rotor, model.nominal_springs, count=shapes)
-            slow = int((basis.mass * highest**2 > 1.0).sum())
-            if shapes >= slow + _MORE_SHAPES or shapes >= len(basis.shapes):
-                break
-            shapes = slow + _MORE_SHAPES
-        (low, high), (first, last) = model.support.known(highest), model.bearings.frequency_range
+        shafts = Shafts.up_to(model, highest, count=max(shapes, MORE_SHAPES))
+        (low, high), (first, last) = (model.support.known(highest),
+                                      model.all_bearings.frequency_range)
         span = max(low, first), min(high, last)
         if not span[0] < span[1]:
             raise OutOfTableError(
                 f'tables of bearings must hold some frequency of vibration up to '
                 f'{rad_s_to_hz(high):.4g} Hz, got {rad_s_to_hz(first):g} to '
                 f'{rad_s_to_hz(last):g} Hz')
-        return cls(model, basis, continued_by_pieces(model.support, span), span, following)
+        return cls(model, shafts, continued_by_pieces(model.support, span), span, following)
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
         """Frequencies between which soil, bearings and shaft each follow one law, rising."""
-        losses = self.basis.losses
+        losses = self.shafts.own.basis.losses
         is_split = losses is not None and losses.is_hysteretic and not self.following
-        return zones_of(self.pieces, self.span, self.model.bearings.frequencies,
+        return zones_of(self.pieces, self.span, self.model.all_bearings.frequencies,
+                        turning_points=self.shafts.turning_points,
                         lags=(-1.0, 1.0) if is_split else (0.0,))
 
     @classmethod
@@ -165,9 +154,9 @@ class SpectrumSolver:
             Modes wanted at each.
 
         """
-        shapes = count // 2 + _MORE_SHAPES
-        basis = ReducedRotor.of(model.rotor, model.nominal_springs, count=shapes)
-        first = highest = _highest(basis, speed, count)
+        shapes = count // 2 + MORE_SHAPES
+        own = ShaftLine.of(model.rotor, None, count=shapes)
+        first = highest = own.highest(speed, count)
         spare = _SPARE
         while True:
             _, found = cls.up_to(model, highest, shapes=shapes).refined(speed, count, spare=spare)
@@ -184,8 +173,9 @@ class SpectrumSolver:
         So many `spare` ones are looked at besides: their order, and whether they vibrate at all,
         shows only in the end.
         """
-        parts = [self._solve(speed[start:start + _CHUNK], count, spare)
-                 for start in range(0, len(speed), _CHUNK)]
+        chunk = max(_CHUNK // len(self.shafts.each), 1)
+        parts = [self._solve(speed[start:start + chunk], count, spare)
+                 for start in range(0, len(speed), chunk)]
         width = max(part.frequency.shape[1] for part in parts)
         return Spectrum(*(np.concatenate([_widen(getattr(part, field.name), width)
                                           for part in parts]) for field in fields(Spectrum)))
@@ -198,69 +188,33 @@ class SpectrumSolver:
         while True:
             found = solver.solve(speed, count, spare=spare)
             if (solver.defect(speed, found) <= _DEFECT
-                    or len(solver.basis.mass) == len(solver.basis.shapes)):
+                    or solver.shafts.is_whole):
                 return solver, found
-            basis = ReducedRotor.of(self.model.rotor, self.model.nominal_springs,
-                                    count=2 * len(solver.basis.mass))
-            solver = replace(solver, basis=basis)
+            solver = replace(solver, shafts=solver.shafts.larger())
 
     def defect(self, speed: FloatArray, found: Spectrum) -> float:
         """
-        Return the largest relative error of a frequency that the rotor's subspace causes.
+        Return the largest relative error of a frequency that the rotors' subspaces cause.
 
-        At the highest speed: forces that the full model lacks there would bend the rotor by so
-        much of its energy.
+        At the highest speed, by the energy of what the full models lack there.
         """
-        model, basis = self.model, self.basis
         row = int(speed.argmax())
         exists = np.isfinite(found.frequency[row])
-        w = found.frequency[row, exists][:, None, None]
-        turning = w * speed[row] * np.array([1.0, -1.0])[:, None]
+        w = found.frequency[row, exists]
         shape = found.rotor[row, exists]
-        stiffness, mass, polar = held(model.rotor, model.nominal_springs)
-        journals = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
-        # What the bearings must exert for the reduced equations to hold, in both of them.
-        exerted = (shape - w**2 * shape * basis.mass + turning * (shape @ basis.polar)
-                   + self._lost(basis.losses, shape, w, speed[row])) @ (
-            np.linalg.pinv(basis.shapes[journals]))
-        full = shape @ basis.shapes.T
-        lacking = full @ stiffness - w**2 * (full @ mass) + turning * (full @ polar)
-        lacking += self._lost(model.rotor.losses, full, w, speed[row])
-        lacking[..., journals] -= exerted
-        bent = scipy.linalg.solve(stiffness, lacking.reshape(-1, len(stiffness)).T,
-                                  assume_a='pos').T.reshape(full.shape)
-        error = np.abs((lacking.conj() * bent).sum(axis=(1, 2)))
-        kinetic = np.abs(w[:, 0] * found.shape[row, exists]) ** 2
-        energy = (np.abs(shape) ** 2).sum(axis=(1, 2)) + kinetic.sum(axis=1)
-        return float((error / energy).max(initial=0.0))
-
-    @staticmethod
-    def _lost(
-        losses: Losses | None, shape: ComplexArray, w: ComplexArray, speed: float,
-    ) -> ComplexArray:
-        """Return what a lossy shaft exerts on shapes (p, 2, m) of frequencies (p, 1, 1)."""
-        if losses is None:
-            return np.zeros_like(shape)
-        return np.stack([
-            shape[:, index] @ losses.held(direction, speed=float(speed), lag=1.0).T
-            + w[:, 0] * (shape[:, index] @ losses.rate(direction).T)
-            for index, direction in enumerate(WHIRL_DIRECTIONS)], axis=1)
-
-    def deflection(self, rotor: ComplexArray) -> ComplexArray:
-        """Return (x, z) of every node, (k, 2), in a shape of the rotor, (2, r)."""
-        return self.bent(rotor)[0]
-
-    def bent(self, rotor: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return deflections as `deflection`, and slopes in the planes of x and z, (k, 2)."""
-        motion = self.basis.shapes @ rotor.T @ ORBITS
-        return motion[::2], motion[1::2]
+        defects = [one.defect(w, shape[..., rows], float(speed[row]))
+                   for one, rows in zip(self.shafts.each, self.shafts.rows, strict=True)]
+        kinetic = np.abs(w[:, None] * found.shape[row, exists]) ** 2
+        error, energy = (np.sum(parts, axis=0) for parts in zip(*defects, strict=True))
+        return float((error / (energy + kinetic.sum(axis=1))).max(initial=0.0))
 
     def _solve(self, speed: FloatArray, count: int, spare: int) -> Spectrum:
-        turning = np.maximum(speed, _CREEP * self.basis.mass.max() ** -0.5)
-        whirls = {lag: self.basis.whirls(turning, lag)
-                  for lag in {zone.lag for zone in self.zones}}
-        parts, strays = zip(*(self._solve_zone(speed, whirls[zone.lag], zone, count + spare)
-                              for zone in self.zones), strict=True)
+        sides = [(zone.lag, int(np.searchsorted(self.shafts.turning_points, zone.middle)))
+                 for zone in self.zones]
+        whirls = {side: self.shafts.whirls(speed, zone.middle, zone.lag)
+                  for side, zone in dict(zip(sides, self.zones, strict=True)).items()}
+        parts, strays = zip(*(self._solve_zone(speed, whirls[side], zone, count + spare)
+                              for side, zone in zip(sides, self.zones, strict=True)), strict=True)
         found, astray = _merged(list(parts), count), np.concatenate(strays, axis=1)
         # What another zone tells there, as one beside it may too, is not lost.
         blur = max(zone.compliance.blur for zone in self.zones)
@@ -293,7 +247,7 @@ class SpectrumSolver:
         vector: ComplexArray, untold: FloatArray,
     ) -> Spectrum:
         """Turn what the equations are solved for into shapes that all speeds share."""
-        basis, exists = self.basis, np.isfinite(frequency)
+        shafts, exists = self.shafts, np.isfinite(frequency)
         states = vibration.amplitudes(np.where(exists, frequency, 0.0), vector)
         turn, half = amplitude.transpose(0, 1, 3, 2), amplitude.shape[3]
         rotor = np.stack([states[..., :half] @ turn[:, 0], states[..., half:] @ turn[:, 1]],
@@ -301,15 +255,20 @@ class SpectrumSolver:
         support = np.concatenate([
             vector[..., vector.shape[2] - len(vibration.mass):] * vibration.compliance.size,
             vibration.bent(np.where(exists, frequency, 0.0), vector) @ self._turn.T], axis=-1)
-        moving = np.sqrt(basis.mass) * rotor
+        moving = np.sqrt(shafts.mass) * rotor
         forward, backward = (np.abs(moving) ** 2).sum(axis=-1).transpose(2, 0, 1)
         values, axes = np.linalg.eigh(self.model.support.motion_mass)
         below = support @ (axes * np.sqrt(np.maximum(values, 0.0)))
         # Explicitly: -1 cannot be told where there is no mode at all.
         moving = moving.reshape(*exists.shape, math.prod(moving.shape[2:]))
         shape = np.concatenate([moving, below], axis=-1)
+        share = shafts.kinetic(rotor)
+        most = share.argmax(axis=-1)
+        beside = 2.0 * share.max(axis=-1) > (np.abs(shape) ** 2).sum(axis=-1)
+        beside &= most != shafts.each.index(shafts.own)
         return Spectrum(
             frequency, np.where(exists, np.where(forward >= backward, 1, -1), 0),
+            np.where(exists & beside, 1 + most, 0),
             np.where(exists[..., None], shape, np.nan), rotor, support, untold)
 
     def _at(
@@ -318,12 +277,9 @@ class SpectrumSolver:
     ) -> FreeVibration:
         inverse, right, left = whirls
         model, support, size = self.model, self.model.support, zone.compliance.size
-        rows = [2 * model.rotor.node_of(bearing.position) for bearing in model.rotor.bearings]
-        unit = np.sqrt(model.nominal_springs)
-        journals = unit[:, None] * self.basis.shapes[rows]
-        unit = np.repeat(unit, 2)
+        unit, journals = np.repeat(np.sqrt(self.shafts.springs), 2), self.shafts.journals
         constant, rate, inertia = (part / (unit[:, None] * unit)
-                                   for part in model.bearings.series(speed, zone.between))
+                                   for part in model.all_bearings.series(speed, zone.between))
         own, mass, turn = len(size), support.motion_mass, self._turn
         held = slice(0, own)
         spring = np.diagonal(turn.T @ support.motion_spring[own:, own:] @ turn)
@@ -336,7 +292,9 @@ class SpectrumSolver:
             unit[:, None] * support.motion_rows[:, held] * size,
             size[:, None] * mass[held, held] * size,
             size[:, None] * support.motion_spring[held, held] * size, elastic, zone.compliance,
-            self.span[1], reach, zone.ends(zone.told, speed))
+            self.span[1], reach, zone.ends(zone.told, speed),
+            tuple(zip(self.shafts.seats, self.shafts.modes, strict=True)),
+            self.shafts.slow(constant, reach * self.span[1]))
 
     @cached_property
     def _turn(self) -> FloatArray:
@@ -361,17 +319,9 @@ def _merged(parts: list[Spectrum], count: int) -> Spectrum:
     def joined(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts], axis=1)[rows, order]
 
-    return Spectrum(joined('frequency'), joined('whirl'), joined('shape'), joined('rotor'),
-                    joined('support'), np.min([part.untold for part in parts], axis=0))
-
-
-def _highest(basis: ReducedRotor, speed: FloatArray, count: int) -> float:
-    """Return a frequency above the first modes of the rotor on its nominal springs."""
-    inverse, _ = basis.spin(np.array([speed.min(), speed.max()]))
-    both = np.sort(np.concatenate([inverse, -inverse], axis=1), axis=1)[:, ::-1]
-    # What has no mass has no mode, but some round-off instead.
-    massive = int((both > _MASSLESS * both[:, :1]).sum(axis=1).min())
-    return float((1.1 / both[:, min(count, massive) - 1]).max())
+    return Spectrum(joined('frequency'), joined('whirl'), joined('owner'), joined('shape'),
+                    joined('rotor'), joined('support'),
+                    np.min([part.untold for part in parts], axis=0))
 
 
 def _widen(values: np.ndarray, width: int) -> np.ndarray:

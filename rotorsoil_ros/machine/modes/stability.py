@@ -232,30 +232,30 @@ class _Growth:
             return
         w = complex(found.frequency[mode])
         rotor = pencil.part(found, mode, 'rotor')
-        moving = np.abs(rotor) ** 2 * np.tile(pencil.solver.basis.mass, 2)
+        moving = np.abs(rotor) ** 2 * np.tile(pencil.solver.shafts.mass, 2)
         forward, backward = moving.reshape(2, -1).sum(axis=1)
         whirl = 0 if abs(w.real) < CREEPING * abs(w) else 1 if forward >= backward else -1
-        name = _name(pencil, found, mode)
-        if whirl > 0 and _is_fed_by_films(pencil, given):
-            name = f'fluid-film whirl, {name}'
+        is_of_films = whirl > 0 and _is_fed_by_films(pencil, given)
+        name = _name(pencil, found, mode, 'fluid-film whirl, ' if is_of_films else '')
         yield Instability(name, self.low, high, found.speed, abs(w.real),
                           _damping(found, mode), whirl, given)
 
 
 def _is_fed_by_films(pencil: Pencil, given: tuple[Feed, ...]) -> bool:
     """Return whether most of what is given comes from the cross-coupling of fluid films."""
-    films = {bearing.name for bearing in pencil.model.rotor.bearings if bearing.is_film}
+    films = {bearing.name for bearing in pencil.model.all_bearings.each if bearing.is_film}
     return sum(feed.share for feed in given
                if feed.name in films and feed.cause == CROSS) > 0.5
 
 
-def _name(pencil: Pencil, found: Vibrations, mode: int) -> str:
+def _name(pencil: Pencil, found: Vibrations, mode: int, how: str) -> str:
     pencil = pencil.where(found.speed, complex(found.frequency[mode]))
     rotor, support = (pencil.part(found, mode, name) for name in ('rotor', 'support'))
     frequency = float(np.clip(np.abs(found.frequency[mode].real), *pencil.solver.span))
+    deflections = [deflection for deflection, _ in pencil.solver.shafts.bent(
+        rotor.reshape(2, -1))]
     return ModeNames(pencil.model).of(
-        pencil.solver.deflection(rotor.reshape(2, -1)), support * pencil.compliance.size,
-        frequency=frequency, speed=found.speed)
+        deflections, support * pencil.size, frequency=frequency, speed=found.speed, how=how)
 
 
 def _damping(found: Vibrations, mode: int) -> float:

@@ -36,6 +36,11 @@ class Zone:
     between: tuple[float, float]
     lag: float
 
+    @property
+    def middle(self) -> float:
+        """A frequency inside [rad/s]."""
+        return 0.5 * (self.told[0] + self.told[1])
+
     def ends(
         self, span: tuple[float, float], speed: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
@@ -61,7 +66,7 @@ class Zone:
 
 def zones_of(
     pieces: Sequence[Continuation], span: tuple[float, float], bends: FloatArray, *,
-    lags: Sequence[float],
+    turning_points: FloatArray, lags: Sequence[float],
 ) -> tuple[Zone, ...]:
     """
     Return the zones of a machine, rising.
@@ -75,11 +80,14 @@ def zones_of(
     bends : (f,) float array
         Frequencies at which tables of bearings bend; beyond the first and the last of them no
         vibration is told [rad/s].
+    turning_points : (h,) float array
+        Frequencies at which what shafts that do not follow exert turns [rad/s].
     lags : sequence of float
         Signs of whirl frequency less rotor speed that make a difference.
 
     """
-    cuts = bends[(bends > span[0]) & (bends < span[1])].tolist()
+    cuts = np.union1d(bends, turning_points)
+    cuts = cuts[(cuts > span[0]) & (cuts < span[1])].tolist()
     last = len(pieces) - 1
     found = []
     for index, piece in enumerate(pieces):
@@ -91,7 +99,12 @@ def zones_of(
         for low, high in pairwise([-math.inf, *cuts, math.inf]):
             part, mine = ((max(low, ends[0]), min(high, ends[1])) for ends in (told, owned))
             if part[0] < part[1]:
-                between = (low, high) if not len(bends) else (
-                    max(low, float(bends[0])), min(high, float(bends[-1])))
+                between = (low, high) if not len(bends) else _about(bends, part)
                 found += [Zone(piece, part, mine, between, lag) for lag in lags]
     return tuple(found)
+
+
+def _about(bends: FloatArray, part: tuple[float, float]) -> tuple[float, float]:
+    """Return the points of tables on both sides of frequencies [rad/s], or the last two."""
+    after = int(np.clip(np.searchsorted(bends, 0.5 * (part[0] + part[1])), 1, len(bends) - 1))
+    return float(bends[after - 1]), float(bends[after])

@@ -88,7 +88,7 @@ class Neighbour:
                 self._modes(highest, lag).receptance(omega[rows]),
                 np.zeros((1, count, count), dtype=complex), np.eye(count, dtype=complex)[None],
                 np.zeros((ports.shape[1], count), dtype=complex),
-                bearings=bearings, springs=np.repeat(model.nominal_springs, 2))
+                bearings=bearings, springs=np.repeat(model.rotor.nominal_springs, 2))
         return ports, through
 
     def _modes(self, highest: float, lag: float) -> WhirlModes:
@@ -98,7 +98,7 @@ class Neighbour:
         if found is None:
             model = self._led
             found = self._found[reach, lag] = WhirlModes.at(
-                self.rotor, model.ports, springs=model.nominal_springs, speed=self.speed,
+                self.rotor, model.ports, springs=model.rotor.nominal_springs, speed=self.speed,
                 highest=reach, lag=lag)
         return found
 

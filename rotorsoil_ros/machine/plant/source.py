@@ -3,23 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.errors import NotSolvedError, RotorSoilError
+from rotorsoil_ros.machine.bearings import Bearings
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.coupling import Answer, driven, gathered
 from rotorsoil_ros.machine.flexible.part import Mount
-from rotorsoil_ros.machine.modes.natural import riding_mass
-from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.neighbour import Neighbour
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.whirl import WhirlModes
-
-_T = TypeVar('_T')
 
 
 @dataclass(frozen=True)
@@ -29,17 +25,17 @@ class JointSupport(Support):
 
     Attributes
     ----------
-    parts : sequence of Support
-        That of each machine, in the order of the bearings.
+    apart : sequence of Mount
+        Where each bearing is.
 
     """
 
-    parts: Sequence[Support] = ()
+    apart: Sequence[Mount] = ()
 
     @property
     def mounts(self) -> list[Mount]:
         """Where every bearing of every machine is."""
-        return [mount for part in self.parts for mount in part.mounts]
+        return list(self.apart)
 
 
 @dataclass(frozen=True)
@@ -47,8 +43,8 @@ class SourceModel(CoupledModel):
     """
     One of several machines, which excites them all.
 
-    Its channels are those of all machines, in their order. Modes and stability are those of the
-    source with its neighbours as rigid bodies; the response knows their rotors.
+    Its channels are those of all machines, in their order. Its modes are those of the plant: the
+    others turn, or stand, at speeds of their own.
 
     Attributes
     ----------
@@ -56,11 +52,14 @@ class SourceModel(CoupledModel):
         The others, in the order of the machines.
     index : int
         How many of them come before the source.
+    names : sequence of str
+        What the machines are called, in their order; numbers where nobody says.
 
     """
 
     neighbours: Sequence[Neighbour] = ()
     index: int = 0
+    names: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.index <= len(self.neighbours):
@@ -70,42 +69,38 @@ class SourceModel(CoupledModel):
     @property
     def rotors(self) -> tuple[Rotor, ...]:
         """All that turn on these blocks, in the order of the channels."""
-        return self._in_order(self.rotor, [one.rotor for one in self.neighbours])
+        return self.in_order(self.rotor, [one.rotor for one in self.neighbours])
+
+    @property
+    def own_speeds(self) -> tuple[float | None, ...]:
+        """Speed at which each of them turns [rad/s]; None of the source."""
+        speeds = [one.speed for one in self.neighbours]
+        return (*speeds[:self.index], None, *speeds[self.index:])
+
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """What each of them is called."""
+        return tuple(self.names) or tuple(
+            f'machine {number}' for number, _ in enumerate(self.rotors, start=1))
+
+    @cached_property
+    def all_bearings(self) -> Bearings:
+        """All that holds any shaft on these blocks."""
+        held = self.in_order(None, [one.held_speed for one in self.neighbours])
+        each = [(bearing, speed) for rotor, speed in zip(self.rotors, held, strict=True)
+                for bearing in rotor.bearings]
+        return Bearings(tuple(bearing for bearing, _ in each),
+                        tuple(speed for _, speed in each))
 
     @cached_property
     def support(self) -> Support:
-        """The blocks below the bearings of the source, its neighbours riding on them."""
-        burden = np.zeros_like(self._alone.block_mass)
-        for support, neighbour in zip(self._beside, self.neighbours, strict=True):
-            mass = riding_mass(neighbour.rotor) + support.housing_mass
-            burden += support.block_rows.T @ mass @ support.block_rows
-        return self._on_blocks(self.rotor, self.place, burden)
-
-    @cached_property
-    def _alone(self) -> Support:
-        return self._on_blocks(self.rotor, self.place)
-
-    @cached_property
-    def _beside(self) -> list[Support]:
-        return [self._on_blocks(one.rotor, one.place) for one in self.neighbours]
-
-    @cached_property
-    def _joint(self) -> JointSupport:
         """The blocks below the bearings of all machines."""
-        parts = self._in_order(self._alone, self._beside)
-        bearings = [bearing for part in parts for bearing in part.bearings]
-        return JointSupport(bearings, self.rotor.shaft_height, self.foundations,
-                            self.soil_models, parts=parts)
-
-    def _on_blocks(
-        self, rotor: Rotor, place: Placement, burden: FloatArray | None = None,
-    ) -> Support:
-        return Support(rotor.bearings, rotor.shaft_height, self.foundations, self.soil_models,
-                       place, burden)
-
-    def _in_order(self, own: _T, others: Sequence[_T]) -> tuple[_T, ...]:
-        """Put what is the source's between what is its neighbours'."""
-        return (*others[:self.index], own, *others[self.index:])
+        places = self.in_order(self.place, [one.place for one in self.neighbours])
+        mounts = [Mount(bearing, rotor.shaft_height, place)
+                  for rotor, place in zip(self.rotors, places, strict=True)
+                  for bearing in rotor.bearings]
+        return JointSupport([mount.bearing for mount in mounts], self.rotor.shaft_height,
+                            self.foundations, self.soil_models, apart=mounts)
 
     @cached_property
     def _rows(self) -> list[slice]:
@@ -125,9 +120,9 @@ class SourceModel(CoupledModel):
         neighbour are f = -Z u with its apparent stiffness Z. Only the source's are unknown, and
         what they meet is (I + H Z)^-1 H.
         """
-        rotor, standing = modes.receptance(omega), self._joint.standing(omega)
+        rotor, standing = modes.receptance(omega), self.support.standing(omega)
         reach, count = rotor.shapes.shape[1], 2 * len(self.rotor.bearings)
-        own, below = self._rows[self.index], loads[reach:]
+        own, below = self.own_seats, loads[reach:]
         moved, pushed = standing.pushed(below, ground)
         led = [one.led(omega) for one in self.neighbours]
         pull = np.zeros_like(standing.receptance)
@@ -140,13 +135,13 @@ class SourceModel(CoupledModel):
         ports, through = driven(
             rotor, met[:, own, :count], met[:, own, count:], loads[:reach],
             bearings=self.bearings.dynamic_stiffness(omega, speed),
-            springs=np.repeat(self.nominal_springs, 2))
+            springs=np.repeat(self.rotor.nominal_springs, 2))
         housings = met[..., :count] @ through + met[..., count:]
         forces = pull @ housings
         forces[:, own] = through
         follow = [ports_of @ housings[:, part]
                   for (ports_of, _), part in zip(led, others, strict=True)]
-        return gathered(standing, self._in_order(ports, follow), housings, forces, below, pushed,
+        return gathered(standing, self.in_order(ports, follow), housings, forces, below, pushed,
                         ground)
 
 

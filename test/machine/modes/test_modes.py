@@ -14,7 +14,7 @@ from rotorsoil_ros.ground.soil import RigidSoil, Soil
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
-from rotorsoil_ros.machine.modes import eigen, spectrum
+from rotorsoil_ros.machine.modes import eigen, shafts, spectrum
 from rotorsoil_ros.machine.modes.campbell import campbell
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.modes.natural import lowest_natural_frequency
@@ -133,6 +133,20 @@ def test_modes_are_found_where_the_guesses_were_too_rough(monkeypatch):
                                    rtol=1e-7)
 
 
+def test_modes_of_bearings_that_are_far_softer_one_way_are_found():
+    """Below every mode on springs of their mean stiffness."""
+    stiffness = np.diag([2e8, 2e6])
+    rotor = uniform_rotor(length=1.0, diameter=0.2, elements=2, material=STEEL,
+                          discs=[Disc('wheel', 0.5, 90.0, 1.0, 2.0)],
+                          bearings=[bearing(name, place, stiffness=stiffness, damping=100.0,
+                                            foundation=None)
+                                    for name, place in (('a', 0.0), ('b', 1.0))])
+    found = critical_speeds(CoupledModel(rotor), (50.0, 180.0))
+    exact = dense_eigenvalues(CoupledModel(rotor), found[0].speed, stiffness=np.zeros((0, 0)),
+                              damping=np.zeros((0, 0)))
+    assert [one.speed for one in found] == pytest.approx([exact[0].imag], rel=1e-8)
+
+
 def test_modes_that_cannot_be_told_apart_are_an_error(monkeypatch):
     monkeypatch.setattr(spectrum, '_REACHES', (0.1,))
     with pytest.raises(NotSolvedError, match='modes could not be told apart at 0 rpm'):
@@ -160,7 +174,7 @@ def vibration_of(model, highest):
     """Return the equations of free vibration at one speed, at the first reach."""
     solver = SpectrumSolver.up_to(model, highest)
     speed = np.array([400.0])
-    return solver._at(speed, solver.basis.whirls(speed, 0.0), solver.zones[0], 1.5)
+    return solver._at(speed, solver.shafts.whirls(speed, 0.0, 0.0), solver.zones[0], 1.5)
 
 
 @pytest.mark.parametrize('stiffness', [1e6, 1e9])
@@ -313,8 +327,9 @@ def test_overhung_disc_on_a_massless_shaft_whirls_as_its_closed_form_says():
 def test_subspace_that_is_too_small_is_enlarged(monkeypatch):
     speeds = np.array([0.0, 3000.0])
     expected = campbell(paper_machine(), speeds, 8).eigenvalue
-    monkeypatch.setattr(spectrum, '_MORE_SHAPES', 0)
-    monkeypatch.setattr(spectrum.ReducedRotor, 'of', _of_few(spectrum.ReducedRotor.of))
+    for room in (spectrum, shafts):
+        monkeypatch.setattr(room, 'MORE_SHAPES', 0)
+    monkeypatch.setattr(shafts.ReducedRotor, 'of', _of_few(shafts.ReducedRotor.of))
     np.testing.assert_allclose(campbell(paper_machine(), speeds, 8).eigenvalue, expected,
                                rtol=1e-8)
 
