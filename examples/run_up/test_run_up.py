@@ -4,7 +4,6 @@ import numpy as np
 from run_up import CHANNEL, FASTEST, RunUp
 
 import rotorsoil_ros as rs
-from rotorsoil_ros.testing.plugin import SHIPPED_CASES
 
 
 def test_the_run_up_draws_what_the_machine_should_do(rotorsoil_twin, tmp_path):
@@ -13,7 +12,7 @@ def test_the_run_up_draws_what_the_machine_should_do(rotorsoil_twin, tmp_path):
     twin.until(lambda: node.is_done, 'the end of the run-up')
     node.draw(str(tmp_path / 'run_up.png'))
     assert (tmp_path / 'run_up.png').read_bytes().startswith(b'\x89PNG')
-    machine = rs.load(SHIPPED_CASES / 'paper_rotor.yaml')
+    machine = rs.load('paper_rotor')
     table = machine.table
     answered = [stamp for stamp in node.amplitudes
                 if table.speed_range[0] <= node.speeds[stamp] <= FASTEST]

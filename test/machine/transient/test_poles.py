@@ -15,7 +15,6 @@ from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.transient.poles import fit
 from rotorsoil_ros.machine.transient.state import Transient
-from rotorsoil_ros.testing.plugin import SHIPPED_CASES
 
 from machines import elastic_machine, paper_machine
 
@@ -36,7 +35,7 @@ def ran(table, unbalance, time, speed):
 @pytest.fixture(scope='module', params=[3e7, 1e8], ids=['30 MPa', '100 MPa'])
 def fan(request):
     """Return the fan whose wheel has no polar inertia, on one of two soils."""
-    machine = rs.load(SHIPPED_CASES / 'plant_fan.yaml',
+    machine = rs.load('plant_fan',
                       soil={'shear_modulus': request.param},
                       **{f'rotor.discs.{disc}.polar_inertia': 0.0 for disc in range(2)})
     table = ResponseTable.build(machine.model, machine.case.speed_range)
