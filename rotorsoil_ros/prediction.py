@@ -1,6 +1,6 @@
 """What a coupled model answers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, TypeAlias
@@ -79,6 +79,24 @@ class Prediction:
         if self.ringing is not None:
             rows, parts = self.ringing
             velocity[rows] = parts[:, 0] + 1j * parts[:, 1]
+        return velocity
+
+    def at(self, rows: IntArray) -> 'Prediction':
+        """Return the response at some speeds, of what is steady."""
+        return Prediction.of_parts(self.speed[rows], self.parts[rows])
+
+    def with_own(
+        self, steady: Callable[[], FloatArray], own: Callable[[FloatArray], FloatArray],
+    ) -> FloatArray:
+        """Return of the velocity what is true of it, (n, c): where it rings, of its own parts."""
+        if self.ringing is None:
+            return steady()
+        rows, parts = self.ringing
+        found = own(parts)
+        if len(rows) == len(self.speed):
+            return found
+        velocity = steady()
+        velocity[rows] = found
         return velocity
 
     def _vector(self, number: int) -> ComplexArray:

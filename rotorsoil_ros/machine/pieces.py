@@ -145,7 +145,7 @@ def evaluate(
     values = out if is_sorted else np.empty_like(out)
     ends = np.flatnonzero(np.diff(index, prepend=-1, append=-1))
     for start, stop in pairwise(ends):
-        _sum(powers[:, start:stop], coefficients[index[start]], out=values[start:stop])
+        summed(powers[:, start:stop], coefficients[index[start]], out=values[start:stop])
     if not is_sorted:
         # `take` copies whole rows, several times as fast as an assignment to `out[order]`.
         np.take(values, np.argsort(order), axis=0, out=out, mode='clip')
@@ -154,13 +154,13 @@ def evaluate(
 def evaluate_one(pieces: Pieces, coefficients: FloatArray, place: float, piece: int) -> FloatArray:
     """Evaluate at a single place, (1, w): the bits of `evaluate`, but few calls of numpy."""
     powers = np.array(pieces.powers_of_one(place, piece))
-    return _sum(powers[:, None], coefficients[piece])
+    return summed(powers[:, None], coefficients[piece])
 
 
-def _sum(powers: FloatArray, rows: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """Return the sum of powers (d, n) times rows (d, w), (n, w)."""
+def summed(weights: FloatArray, rows: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    """Return the sum of weights (d, n) times rows (d, w), (n, w)."""
     # Not a matrix product: einsum adds term after term for each element, whatever n is.
-    return np.asarray(np.einsum('dn,dw->nw', powers, rows, out=out))
+    return np.asarray(np.einsum('dn,dw->nw', weights, rows, out=out))
 
 
 def refine(

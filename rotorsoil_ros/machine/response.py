@@ -1,8 +1,7 @@
 """What the machine answers at any speed, without solving again."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 import math
 
 import numpy as np
@@ -12,9 +11,9 @@ from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError, RotorSoilError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.stability import Stability, stability
-from rotorsoil_ros.machine.pieces import DEGREE, evaluate, evaluate_one, Pieces, refine
+from rotorsoil_ros.machine.pieces import DEGREE, evaluate, evaluate_one, Pieces, refine, summed
 from rotorsoil_ros.machine.transient.poles import Poles, poles_of
-from rotorsoil_ros.machine.transient.state import Deviation
+from rotorsoil_ros.machine.transient.state import Struck
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.units import rad_s_to_rpm
 
@@ -175,7 +174,7 @@ class ResponseTable:
                          self._strength(unbalance))
 
     def _strength(self, unbalance: ComplexArray) -> FloatArray:
-        """Return what real and imaginary parts of deviations do, (2 k, 4 c)."""
+        """Return what the real and the imaginary part of each deviation does, (2 k, 4 c)."""
         if not len(self.poles):
             return np.zeros((0, 4 * len(self.channels)))
         weighted = np.einsum('kpw,p->kw', self.poles.strength, unbalance)
@@ -183,9 +182,9 @@ class ResponseTable:
         vectors = np.zeros((len(weighted), 2 * moving), dtype=complex)
         vectors[:, :moving] = weighted[:, :moving]
         vectors[:, moving:][:, self.transmits_force] = weighted[:, moving:]
-        turned = 1j * vectors
-        return np.concatenate([np.concatenate([part.real, part.imag], axis=1)
-                               for part in (vectors, turned)])
+        # Of a weight its real part and then its imaginary one, as they lie in memory.
+        both = np.stack([vectors, 1j * vectors], axis=1).reshape(-1, 2 * moving)
+        return np.concatenate([both.real, both.imag], axis=1)
 
     def measure(self, model: CoupledModel) -> float:
         """Return the largest deviation from the exact solution at speeds not yet seen."""
@@ -262,7 +261,7 @@ class Predictor:
     coefficients : (k, degree + 1, 4 c) float array
         Real parts of all channels and of all forces, then their imaginary parts.
     strength : (2 m, 4 c) float array
-        What the real parts of m deviations do to the same, then their imaginary parts.
+        What the real and the imaginary part of each of m deviations does to the same.
 
     """
 
@@ -313,7 +312,7 @@ class Predictor:
             parts[covered] = self.predict(speed[covered]).parts
         return Prediction.of_parts(speed, parts)
 
-    def moved(self, steady: Prediction, deviations: Sequence[Deviation]) -> Prediction:
+    def moved(self, steady: Prediction, struck: Struck | None) -> Prediction:
         """
         Return a steady response with what a changing speed adds to it.
 
@@ -321,8 +320,8 @@ class Predictor:
         ----------
         steady : Prediction
             Of n speeds.
-        deviations : sequence of n deviations
-            As `Transient` tells them; None where there is none.
+        struck : Struck or None
+            What rings at some of them, as `Transient` tells it.
 
         Returns
         -------
@@ -330,25 +329,24 @@ class Predictor:
             The same numbers, to the last bit, however the speeds are divided into calls.
 
         """
-        rows = np.array([row for row, deviation in enumerate(deviations)
-                         if deviation is not None], dtype=np.int64)
-        if not len(rows):
+        if struck is None:
             return steady
-        count = len(self.channels)
+        (rows, weights), count = struck, len(self.channels)
+        # Of d and of A d real and imaginary parts, (2 k, m, 2), in the order of `strength`.
+        numbers = weights.view(float).transpose(2, 0, 1)
+        added = summed(np.ascontiguousarray(numbers).reshape(len(numbers), -1), self.strength)
+        away, changing = added.reshape(-1, 2, 2, 2, count).transpose(1, 0, 2, 3, 4)
         parts = steady.parts.copy()
-        away, changing = (np.array(part) for part in zip(*filter(None, deviations), strict=True))
-        parts[rows] += _in_order(away, self.strength).reshape(-1, 2, 2, count)
-        velocity = _in_order(changing, self._motions).reshape(-1, 2, count)
-        turning = steady.speed[rows, None]
-        velocity[:, 0] -= turning * parts[rows, 1, 0]
-        velocity[:, 1] += turning * parts[rows, 0, 0]
+        if len(rows) == len(parts):
+            parts += away
+            moved = parts
+        else:
+            moved = parts[rows] + away
+            parts[rows] = moved
+        velocity, turning = changing[:, :, 0], steady.speed[rows, None]
+        velocity[:, 0] -= turning * moved[:, 1, 0]
+        velocity[:, 1] += turning * moved[:, 0, 0]
         return Prediction.of_parts(steady.speed, parts, (rows, velocity))
-
-    @cached_property
-    def _motions(self) -> FloatArray:
-        """The columns of `strength` that are motions, (2 m, 2 c)."""
-        columns = self.strength.reshape(-1, 2, 2, len(self.channels))[:, :, 0]
-        return columns.reshape(len(self.strength), -1)
 
     def _row(self, speed: float) -> FloatArray:
         pieces = self.table.pieces
@@ -376,14 +374,3 @@ class Predictor:
         return OutOfTableError(
             f'speed must be within {rad_s_to_rpm(low):g} to {rad_s_to_rpm(high):g} rpm and off '
             f'undamped resonances, got {rad_s_to_rpm(speed):g} rpm')
-
-
-def _in_order(weights: ComplexArray, columns: FloatArray) -> FloatArray:
-    """Return sums over (m, k) weights of (2 k, w) columns, in one order for any m, (m, w)."""
-    parts = np.concatenate([weights.real, weights.imag], axis=1)
-    if len(parts) == 1:
-        return np.asarray((parts[0][:, None] * columns).sum(axis=0)[None])
-    total = parts[:, :1] * columns[0]
-    for index in range(1, len(columns)):
-        total += parts[:, index, None] * columns[index]
-    return np.asarray(total)

@@ -18,6 +18,7 @@ from rotorsoil_ros.events import (
     Level,
     Measured,
     NANOSECONDS,
+    Predicted,
     Reason,
     Remark,
     Samples,
@@ -103,13 +104,15 @@ class Judge:
                 or (self._comparer.envelope is not None
                     and self._is_band_due(int(stamp_ns[0]), float(speed[0]))))
 
-    def follow(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[Event]:
+    def follow(self, predicted: Predicted) -> Iterator[Event]:
         """Yield the band of these speeds, and the comparisons that waited for them."""
+        stamp_ns, moved = predicted.stamp_ns, predicted.prediction
+        speed, steady = moved.speed, predicted.steady or moved
         if self._comparer.envelope is not None:
             rows = list(self._band_rows(stamp_ns, speed))
             if rows:
-                answers = self._comparer.answers(stamp_ns[rows], speed[rows])
-                band = self._comparer.band(speed[rows], *answers)
+                band = self._comparer.band(
+                    speed[rows], steady.displacement[rows], moved.displacement[rows])
                 assert band is not None
                 yield Band(self.machine, stamp_ns[rows], speed[rows], band.low, band.high)
         yield from self._matched()

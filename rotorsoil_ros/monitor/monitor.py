@@ -77,11 +77,12 @@ class Monitor:
         except OutOfTableError:
             steady, answered = self._predict_with_gaps(speed)
         prediction = self._predictor.moved(steady, self._transient.follow(stamp_ns, answered))
-        self._emit(Predicted(self.machine, stamp_ns, prediction,
-                             steady if len(self.table.poles) else None))
+        predicted = Predicted(self.machine, stamp_ns, prediction,
+                              steady if len(self.table.poles) else None)
+        self._emit(predicted)
         if self.judge.on_speed(
                 stamp_ns, speed, np.full(len(speed), np.nan) if angle is None else angle):
-            self._emit_all(self.judge.follow(stamp_ns, speed))
+            self._emit_all(self.judge.follow(predicted))
         if self.health.has_news:
             self._emit(self.health.announce(int(stamp_ns[-1])))
 

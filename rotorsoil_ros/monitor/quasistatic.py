@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from rotorsoil_ros.arrays import FloatArray, IntArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.machine.transient.state import LONGEST_GAP_NS, Transient
 from rotorsoil_ros.monitor.vectors.history import History, nearest
@@ -175,22 +175,20 @@ class Unsettled:
         began_ns = np.array(transient.began_ns, dtype=np.int64)
         last = np.searchsorted(began_ns, stamp_ns, side='right') - 1
         share = np.full(len(speed), math.inf)  # before it began nothing is known
-        for row, (index, stamp, turning) in enumerate(zip(
-                last.tolist(), stamp_ns.tolist(), speed.tolist(), strict=True)):
-            if index < 0:
-                continue
+        for index in np.unique(last[last >= 0]).tolist():
+            rows = np.flatnonzero(last == index)
+            pace = transient.rate(speed[rows])
             if (began := int(began_ns[index])) != self._began_ns:
                 self._began_ns = began
-                self._missing = _missed(transient, turning, float(rate[row]))
-            pace = transient.rate(turning)
-            left = np.exp(pace.real * ((stamp - began) / NANOSECONDS)) * self._missing
-            share[row] = float((left * np.abs(pace)).max(initial=0.0))
+                self._missing = _missed(transient, pace[0], float(rate[rows[0]]))
+            since = (stamp_ns[rows, None] - began) / NANOSECONDS
+            left = np.exp(pace.real * since) * self._missing
+            share[rows] = (left * np.hypot(pace.real, pace.imag)).max(axis=1, initial=0.0)
         return share
 
 
-def _missed(transient: Transient, speed: float, rate: float) -> FloatArray:
-    """Return by how much each envelope may have been off at a beginning, (k,) [s]."""
-    pace = transient.rate(speed)
+def _missed(transient: Transient, pace: ComplexArray, rate: float) -> FloatArray:
+    """Return by how much each envelope may have been off at a beginning with A, (k,) [s]."""
     turning = np.abs(transient.turns * rate)
     missed = turning / np.abs(pace) ** 3
     # A = Re A + i (1 - g) (omega - Omega): behind the resonance in the sense of the rate.

@@ -39,6 +39,8 @@ OWN_TOPICS = {
     'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
     'model': STRING}
 
+ROOT_2 = math.sqrt(2.0)
+
 # Of rcl_interfaces/msg/Log.
 INFO, WARNING, FAILURE = 20, 30, 40
 SEVERITY = {Level.OK: INFO, Level.WARN: WARNING, Level.ERROR: FAILURE, Level.STALE: WARNING}
@@ -99,25 +101,23 @@ def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
     """Return zero-to-peak values: displacement and force (n, 2, c), and velocity (n, c)."""
     # Bitwise the same for one speed and for many, which `np.abs` of complex numbers is not: it
     # may take another path for the tail of an array than for its body.
-    squares = prediction.parts * prediction.parts
-    sizes: FloatArray = np.sqrt(squares[:, 0] + squares[:, 1])
-    velocity = sizes[:, 0] * prediction.speed[:, None]
-    if prediction.ringing is not None:
-        rows, moving = prediction.ringing
-        squares = moving * moving
-        velocity[rows] = np.sqrt(squares[:, 0] + squares[:, 1])
-    return sizes, velocity
+    sizes = _moduli(prediction.parts)
+    return sizes, prediction.with_own(
+        lambda: sizes[:, 0] * prediction.speed[:, None], _moduli)
+
+
+def _moduli(parts: FloatArray) -> FloatArray:
+    """Return moduli of real and imaginary parts, (n, 2, ...)."""
+    squares = parts * parts
+    return np.asarray(np.sqrt(squares[:, 0] + squares[:, 1]))
 
 
 def phases(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
     """Return phases in [-pi, pi] [rad]: displacement and force, and velocity, as of i X."""
-    parts = prediction.parts
-    real, imag = parts[:, 0], parts[:, 1]
-    velocity = np.arctan2(real[:, 0], -imag[:, 0])
-    if prediction.ringing is not None:
-        rows, moving = prediction.ringing
-        velocity[rows] = np.arctan2(moving[:, 1], moving[:, 0])
-    return np.arctan2(imag, real), velocity
+    real, imag = prediction.parts[:, 0], prediction.parts[:, 1]
+    return np.arctan2(imag, real), prediction.with_own(
+        lambda: np.asarray(np.arctan2(real[:, 0], -imag[:, 0])),
+        lambda moving: np.asarray(np.arctan2(moving[:, 1], moving[:, 0])))
 
 
 class JointStateWriter:
@@ -140,16 +140,22 @@ class JointStateWriter:
         self._between = [template[stop:start]
                          for stop, start in zip(stops, starts, strict=True)]
         self._width = 8 * len(names)
+        self._unknown = np.full(2 * len(names), np.nan).tobytes()
 
     def write(self, stamp_ns: Sequence[int], values: FloatArray) -> list[bytes]:
         """Return n messages; values are (n, 3, names): position, velocity, effort, or NaN."""
         return self.write_parts(stamp_ns, values[:, ::2], values[:, 1])
 
     def write_parts(
-        self, stamp_ns: Sequence[int], outer: FloatArray, velocity: FloatArray,
+        self, stamp_ns: Sequence[int], outer: FloatArray | None, velocity: FloatArray,
     ) -> list[bytes]:
-        """Return n messages of position and effort, (n, 2, names), and velocity, (n, names)."""
-        ends, middle, width = outer.tobytes(), velocity.tobytes(), self._width
+        """
+        Return n messages of position and effort, (n, 2, names), and velocity, (n, names).
+
+        Position and effort that are None are NaN.
+        """
+        middle, width = velocity.tobytes(), self._width
+        ends = self._unknown * len(stamp_ns) if outer is None else outer.tobytes()
         front, names, to_velocity, to_effort, tail = self._between
         written, start = [], 0
         for stamp in stamp_ns:
@@ -174,7 +180,7 @@ class Encoder:
     topics : Topics
         Where.
     wants_steady : callable
-        Whether anybody hears what a machine does at constant speed: nearly twice the bytes.
+        Whether anybody hears what a machine would do at constant speed, where it does not.
 
     """
 
@@ -184,10 +190,10 @@ class Encoder:
     ) -> None:
         self._machine, self._topics, self._wants_steady = machine, topics, wants_steady
         self._joint_states = JointStateWriter(channels, machine)
-        self._housings = [column for column, channel in enumerate(channels)
-                          if channel.is_housing]
-        self._velocities = JointStateWriter([channels[column] for column in self._housings],
-                                            machine)
+        self._housings = np.array([column for column, channel in enumerate(channels)
+                                   if channel.is_housing], dtype=np.intp)
+        self._velocities = JointStateWriter(
+            [channel for channel in channels if channel.is_housing], machine)
         self._writers: dict[tuple[str, ...], JointStateWriter] = {}
 
     def encode(self, event: Event) -> Iterator[Records]:
@@ -222,16 +228,21 @@ class Encoder:
         yield Records(topics.amplitude, JOINT_STATE, stamps, amplitude)
         phase = write(stamps, *phases(event.prediction))
         yield Records(topics.phase, JOINT_STATE, stamps, phase)
-        if self._housings:
-            rms = velocity[:, self._housings] / math.sqrt(2.0)
-            yield Records(topics.velocity_rms, JOINT_STATE, stamps, self._velocities.write_parts(
-                stamps, np.full((len(rms), 2, rms.shape[1]), np.nan), rms))
-        if (steady := event.steady) is not None and self._wants_steady():
-            if steady is not event.prediction:  # else the same bytes are said of both
-                amplitude = write(stamps, *moduli(steady))
-                phase = write(stamps, *phases(steady))
-            yield Records(topics.steady_amplitude, JOINT_STATE, stamps, amplitude)
-            yield Records(topics.steady_phase, JOINT_STATE, stamps, phase)
+        if len(self._housings):
+            rms = velocity.take(self._housings, axis=1)
+            rms /= ROOT_2
+            yield Records(topics.velocity_rms, JOINT_STATE, stamps,
+                          self._velocities.write_parts(stamps, None, rms))
+        # What rings nowhere is the steady answer: the same is not said twice.
+        if (event.steady is not None and event.prediction.ringing is not None
+                and self._wants_steady()):
+            rows = event.prediction.ringing[0]
+            steady = event.steady.at(rows)
+            stamps = event.stamp_ns[rows].tolist()
+            yield Records(topics.steady_amplitude, JOINT_STATE, stamps,
+                          write(stamps, *moduli(steady)))
+            yield Records(topics.steady_phase, JOINT_STATE, stamps,
+                          write(stamps, *phases(steady)))
 
     def _band(self, event: Band) -> Iterator[Records]:
         stamps, speed = event.stamp_ns.tolist(), event.speed[:, None]

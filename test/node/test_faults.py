@@ -235,7 +235,7 @@ def test_time_that_runs_a_hundred_times_faster_changes_no_answer(bench, machine)
         moved = transient.follow(np.array([stamp_ns(amplitude[row])]), np.array([speed]))
         assert_answers(amplitude[row], phase[row],
                        predictor.moved(exact(machine, speed), moved))
-    assert moved[0] is not None
+    assert moved is not None
     bench.graph.until(lambda: node.get_clock().now().nanoseconds == now_ns, 'the clock')
     bare = bench.speaker('/fan/rotor/speed', Float64)
     bare(Float64(data=300.0))

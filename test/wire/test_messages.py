@@ -103,13 +103,22 @@ def test_amplitude_and_phase_carry_displacement_velocity_and_force():
 
 
 @pytest.mark.parametrize('wanted', [True, False])
-def test_what_is_done_at_constant_speed_is_said_where_somebody_hears_it(wanted):
-    told = event(3)
-    told = replace(told, steady=told.prediction)
-    said = Encoder('m', NAMES, Topics.of('', 'm'), wants_steady=lambda: wanted).encode(told)
-    assert [records.topic for records in said] == [
+def test_what_is_done_at_constant_speed_is_said_where_it_differs_and_somebody_hears_it(wanted):
+    encoder = Encoder('m', NAMES, Topics.of('', 'm'), wants_steady=lambda: wanted)
+    steady, rows = event(3), np.array([0, 2])
+    rings = Prediction.of_parts(steady.prediction.speed, 2.0 * steady.prediction.parts,
+                                (rows, np.ones((2, 2, len(NAMES)))))
+    said = {records.topic: records for records in encoder.encode(
+        replace(steady, prediction=rings, steady=steady.prediction))}
+    assert list(said) == [
         f'/rotorsoil/m/{name}' for name in ('amplitude', 'phase', 'velocity_rms', *(
             ('steady/amplitude', 'steady/phase') if wanted else ()))]
+    amplitude, phase, _ = encoder.encode(steady)
+    for plain in (amplitude, phase) if wanted else ():
+        found = said[plain.topic.replace('/m/', '/m/steady/')]
+        assert found.log_time_ns == [plain.log_time_ns[row] for row in rows]
+        assert found.payloads == [plain.payloads[row] for row in rows]
+    assert len(list(encoder.encode(replace(steady, steady=steady.prediction)))) == 3
 
 
 @pytest.mark.parametrize('count', [2, 7, 64, 1000])

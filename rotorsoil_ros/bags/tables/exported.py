@@ -177,14 +177,14 @@ class _Machine:
             row: dict[str, Value] = {
                 'machine': self._name, 'stamp_ns': stamp, 'channel': name, 'speed_rad_s': speed}
             for quantity in SIZED:
-                at, rate = told.get(quantity, {}).get(name, (math.nan, math.nan))
+                at, rate = _said(told, quantity, name)
                 size = at if math.isfinite(at) or not speed > 0.0 else rate / speed
                 row[f'{quantity}_{channel.unit}'] = size
                 if quantity in ('predicted', 'measured') and not channel.is_rotation:
                     rms = (rate if math.isfinite(rate) else speed * at) / math.sqrt(2.0)
                     row[f'{quantity}_velocity_m_s_rms'] = rms
             for quantity in ('predicted_phase', 'steady_phase', 'measured_phase'):
-                at, rate = told.get(quantity, {}).get(name, (math.nan, math.nan))
+                at, rate = _said(told, quantity, name)
                 ahead = math.remainder(rate - 0.5 * math.pi, 2.0 * math.pi)
                 row[f'{quantity}_rad'] = at if math.isfinite(at) else ahead
             for source in ('predicted', 'measured'):
@@ -193,6 +193,15 @@ class _Machine:
             if any(low <= speed <= high for low, high in self.unstable):
                 row['not_predicted'] = UNSTABLE
             yield row
+
+
+def _said(
+    told: Mapping[str, Mapping[str, tuple[float, float]]], quantity: str, name: str,
+) -> tuple[float, float]:
+    """Return displacement and velocity of a quantity of a channel, NaN where nothing is told."""
+    if quantity.startswith('steady') and quantity not in told:  # then the answer is the steady one
+        quantity = quantity.replace('steady', 'predicted')
+    return told.get(quantity, {}).get(name, (math.nan, math.nan))
 
 
 class _Tables:

@@ -1,15 +1,14 @@
 """How far a machine is from its steady response, now that its speed has changed: in steps."""
 
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import wofz
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.machine.transient.poles import Poles
 
 # After so long without a speed nobody knows how it has changed, and a machine is taken to be
@@ -24,14 +23,28 @@ _EVEN = 1e-8
 # of what a table of responses promises.
 _NOTHING = 1e-6
 
-# Past states that are kept: what is measured may be asked for three seconds later.
-_PAST = 1 << 14
+# Past states that are kept, for what is measured and told late: so many, and so old [ns].
+_PAST, _PAST_NS = 1 << 14, 100_000_000_000
 
 _NANOSECOND = 1e-9
 _ROOT_PI = math.sqrt(math.pi)
 
-# Of all vibrations d = v + 1 / A [s] and A d [-], (k,) each; None where there is no deviation.
-Deviation: TypeAlias = tuple[ComplexArray, ComplexArray] | None
+
+class Struck(NamedTuple):
+    """
+    What rings at m of n speeds beside the steady response.
+
+    Attributes
+    ----------
+    rows : (m,) int array
+        Which of them.
+    weights : (m, 2, k) complex array
+        Of all vibrations d = v + 1 / A [s] and A d [-].
+
+    """
+
+    rows: IntArray
+    weights: ComplexArray
 
 
 def step(
@@ -61,9 +74,10 @@ def step(
     turn: ComplexArray = time * (after - before)
     gone = np.exp(exponent)
     even = np.abs(turn) < _EVEN
-    if even.all():
+    count = np.count_nonzero(even)
+    if count == even.size:
         return gone, time * _mean_of_exponential(gone, exponent)
-    if not even.any():
+    if not count:
         return gone, _swept(before, after, _root(turn, time), gone)
     root = _root(np.where(even, 1.0 + 0j, turn), time)
     return gone, np.where(even, time * _mean_of_exponential(gone, exponent),
@@ -91,7 +105,7 @@ def _swept(
     root, begins = side * root, side * begins
     ends = after / root
     past = ends.real < 0.0
-    if past.any():  # w itself overflows there; the exponential is the ring-down
+    if np.count_nonzero(past):  # w itself overflows there; the exponential is the ring-down
         behind = wofz(np.where(past, -1j, 1j) * ends)
         behind = np.where(past, 2.0 * np.exp(np.where(past, ends * ends, 0.0)) - behind, behind)
     else:
@@ -99,22 +113,13 @@ def _swept(
     return np.asarray(_ROOT_PI / root * (gone * wofz(1j * begins) - behind))
 
 
-@dataclass(frozen=True, slots=True)
-class _Moment:
-    """When the machine had which speed [rad/s] and envelopes; None where it was steady."""
-
-    stamp_ns: int
-    speed: float
-    envelopes: ComplexArray | None
+# When [ns] the machine had which speed [rad/s] and envelopes (k,); None where it was steady. Plain
+# tuples: thousands are kept, and among such nobody looks for garbage.
+_Moment: TypeAlias = tuple[int, float, ComplexArray | None]
 
 
-class _Way(NamedTuple):
-    """From one speed to the next: A at both, and what `step` tells, (k,) each."""
-
-    before: ComplexArray
-    after: ComplexArray
-    gone: ComplexArray
-    driven: ComplexArray
+# From one speed to the next, what `step` tells of every vibration, (k,) each.
+_Way: TypeAlias = tuple[ComplexArray, ComplexArray]
 
 
 class Transient:
@@ -140,18 +145,24 @@ class Transient:
     def __init__(self, poles: Poles) -> None:
         self.poles = poles
         self.turns = 1.0 - poles.slope
-        self._decay = self.turns * poles.decay
-        self._now: _Moment | None = None
+        self._decay, self._turning = self.turns * poles.decay, 1j * self.turns
+        self._now: _Moment = -LONGEST_GAP_NS - 1, math.nan, None
+        self._last_rate = math.nan, self._decay
         self._past, self._began = deque[_Moment](maxlen=_PAST), deque[int](maxlen=_PAST)
+        self._rests = False  # the last two of the past are the ends of a rest
 
     @property
     def began_ns(self) -> tuple[int, ...]:
         """When it was taken to be steady."""
         return tuple(self._began)
 
-    def follow(self, stamp_ns: IntArray, speed: FloatArray) -> list[Deviation]:
+    def rate(self, speed: FloatArray) -> ComplexArray:
+        """Return A = (1 - g) (lambda - i Omega) of all vibrations, (n, k) [1/s]."""
+        return np.asarray(self._decay - speed[:, None] * self._turning)
+
+    def follow(self, stamp_ns: IntArray, speed: FloatArray) -> Struck | None:
         """
-        Return how far all vibrations are from their steady responses at each speed.
+        Return how far all vibrations are from their steady responses; None if nothing rings.
 
         Parameters
         ----------
@@ -159,83 +170,120 @@ class Transient:
             When [ns], and which [rad/s]; NaN where none is answered.
 
         """
+        if not len(self.turns):
+            return None
         if len(speed) == 1:  # message by message
-            return [self._take(int(stamp_ns[0]), float(speed[0]))]
+            value = speed.item()
+            return self._struck([0], speed, [self._take(stamp_ns.item(), value)] if (
+                math.isfinite(value)) else [None])
         answered = np.flatnonzero(np.isfinite(speed))
-        ways = dict(zip(answered[1:].tolist(), self._ways(stamp_ns[answered], speed[answered]),
-                        strict=True)) if len(answered) > 1 else {}
-        return [self._take(stamp, value, ways.get(row)) for row, (stamp, value) in enumerate(zip(
-            stamp_ns.tolist(), speed.tolist(), strict=True))]
+        stamps, told = stamp_ns[answered], speed[answered]
+        return self._struck(answered.tolist(), told, list(map(
+            self._take, stamps.tolist(), told.tolist(), self._ways(stamps, told))))
 
-    def _ways(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[_Way]:
-        """Yield the ways from each speed to the next, found element by element at once."""
-        rate = self._decay - 1j * (speed[:, None] * self.turns)
-        time = np.diff(stamp_ns) * _NANOSECOND
+    def at(self, stamp_ns: IntArray, speed: FloatArray) -> Struck | None:
+        """
+        Return the deviations at times that are past, from the steady responses to speeds (n,).
+
+        Nothing too where nothing is known of such a time, or the speed [rad/s] is NaN.
+        """
+        answered = np.flatnonzero(np.isfinite(speed))
+        return self._struck(answered.tolist(), speed[answered],
+                            list(map(self._then, stamp_ns[answered].tolist())))
+
+    def _ways(self, stamp_ns: IntArray, speed: FloatArray) -> Iterator[_Way | None]:
+        """Yield the way to each speed, all found at once, element by element; not to the first."""
+        yield from [None] * len(speed[:1])
+        if len(speed) < 2:
+            return
+        rate, time = self.rate(speed), np.diff(stamp_ns) * _NANOSECOND
         with np.errstate(all='ignore'):  # what goes back or nowhere is not taken
             gone, driven = step(rate[:-1], rate[1:], np.where(time > 0.0, time, 1.0)[:, None])
-        return map(_Way, rate[:-1], rate[1:], gone, driven)
+        yield from zip(gone, driven, strict=True)
 
-    def at(self, stamp_ns: int, speed: float) -> Deviation:
-        """
-        Return the deviations at a time that is past, from the steady response to a speed [rad/s].
-
-        None too where nothing is known of that time.
-        """
+    def _then(self, stamp: int) -> ComplexArray | None:
+        """Return the envelopes at a time that is past; None if it was steady or is not known."""
         before = after = None
         for moment in reversed(self._past):
-            if moment.stamp_ns <= stamp_ns:
+            if moment[0] <= stamp:
                 before = moment
                 break
             after = moment
-        if before is None or stamp_ns - before.stamp_ns > LONGEST_GAP_NS:
+        if before is None or stamp - before[0] > LONGEST_GAP_NS:
             return None
-        between, since = before.speed, stamp_ns - before.stamp_ns
+        between = before[1]
         if after is not None:
-            share = since / (after.stamp_ns - before.stamp_ns)
-            between += share * (after.speed - before.speed)
-        envelopes = self._stepped(before, between, since * _NANOSECOND)
-        return None if envelopes is None else _deviation(envelopes, self.rate(speed))
-
-    def _take(self, stamp: int, speed: float, way: _Way | None = None) -> Deviation:
-        if not math.isfinite(speed):
+            between += (stamp - before[0]) / (after[0] - before[0]) * (after[1] - between)
+        if before[2] is None and between == before[1]:
             return None
-        now, envelopes, deviation = self._now, None, None
-        if now is None or not 0 <= stamp - now.stamp_ns <= LONGEST_GAP_NS:
-            if now is None or stamp < now.stamp_ns:
+        return self._stepped(before, stamp, between)
+
+    def _take(
+        self, stamp: int, speed: float, way: _Way | None = None,
+    ) -> ComplexArray | None:
+        """Return the envelopes at the next speed; None where the machine is steady."""
+        envelopes, rests = None, False
+        last_ns, last_speed, last = self._now
+        if not 0 <= stamp - last_ns <= LONGEST_GAP_NS:
+            if stamp < last_ns:
                 self._past.clear()
                 self._began.clear()
             self._began.append(stamp)
+        elif last is None and speed == last_speed:
+            rests = True
         else:
-            envelopes = self._stepped(now, speed, (stamp - now.stamp_ns) * _NANOSECOND, way)
-        if envelopes is not None:
-            deviation = _deviation(envelopes, self.rate(speed) if way is None else way.after)
-            if (np.abs(deviation[1]) < _NOTHING).all():
-                envelopes = deviation = None
-        self._now = _Moment(stamp, speed, envelopes)
-        self._past.append(self._now)
-        return deviation
-
-    def rate(self, speed: float) -> ComplexArray:
-        """Return A = (1 - g) (lambda - i Omega) of all vibrations, (k,) [1/s]."""
-        return np.asarray(self._decay - 1j * (speed * self.turns))
+            envelopes = self._stepped(self._now, stamp, speed, way)
+            if speed == last_speed and not _is_left(1.0 + envelopes * self._rate_of(speed)):
+                envelopes = None
+        self._now = stamp, speed, envelopes
+        if rests and self._rests:
+            self._past[-1] = self._now
+        else:
+            self._past.append(self._now)
+            if stamp - self._past[0][0] > _PAST_NS:
+                self._past.popleft()
+        self._rests = rests
+        return envelopes
 
     def _stepped(
-        self, moment: _Moment, speed: float, time: float, way: _Way | None = None,
-    ) -> ComplexArray | None:
-        """Return the envelopes when the speed has gone evenly to another; None if still steady."""
-        envelopes = moment.envelopes
+        self, moment: _Moment, stamp: int, speed: float, way: _Way | None = None,
+    ) -> ComplexArray:
+        """Return the envelopes when the speed has gone evenly from that of a moment to another."""
+        since, told, envelopes = moment
         if envelopes is None:
-            if speed == moment.speed or not len(self.turns):
-                return None
-            envelopes = -1.0 / (self.rate(moment.speed) if way is None else way.before)
-        if time <= 0.0:  # the same moment told twice: the newer speed is taken, nothing has moved
+            envelopes = -1.0 / self._rate_of(told)
+        if stamp == since:  # the same moment told twice: the newer speed is taken, nothing moves
             return envelopes
-        if way is not None:
-            return way.gone * envelopes + way.driven
-        gone, driven = step(self.rate(moment.speed), self.rate(speed), time)
-        return gone * envelopes + driven
+        gone, driven = way or step(
+            self._rate_of(told), self._rate_of(speed), (stamp - since) * _NANOSECOND)
+        return np.asarray(gone * envelopes + driven)
+
+    def _rate_of(self, speed: float) -> ComplexArray:
+        """Return `rate` at one speed, (k,); the last one is known."""
+        if speed != self._last_rate[0]:
+            self._last_rate = speed, self.rate(np.array([speed]))[0]
+        return self._last_rate[1]
+
+    def _struck(
+        self, rows: Sequence[int], speed: FloatArray, envelopes: Sequence[ComplexArray | None],
+    ) -> Struck | None:
+        """Return the deviations of those rows in which anything is left of one."""
+        known = [row for row, each in enumerate(envelopes) if each is not None]
+        if not known:
+            return None
+        rate = self._rate_of(speed.item())[None] if len(speed) == 1 else self.rate(speed[known])
+        weights = np.empty((len(known), 2, len(self.turns)), dtype=complex)
+        # Of the same shape: of what is broadcast numpy rounds a product in another way.
+        share = np.concatenate([envelopes[row] for row in known]).reshape(rate.shape) * rate
+        share += 1.0
+        np.divide(share, rate, out=weights[:, 0])
+        weights[:, 1] = share
+        left = _is_left(share)
+        if np.count_nonzero(left) == len(left):
+            return Struck(np.array(rows)[known], weights)
+        return Struck(np.array(rows)[known][left], weights[left]) if left.any() else None
 
 
-def _deviation(envelopes: ComplexArray, rate: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    share = 1.0 + envelopes * rate
-    return share / rate, share
+def _is_left(share: ComplexArray) -> BoolArray:
+    """Return whether anything is left of a vibration, (...) of shares A d (..., k)."""
+    return np.asarray(np.abs(share.view(float)).max(axis=-1) >= _NOTHING)

@@ -81,9 +81,7 @@ class Comparer:
     ) -> tuple[ComplexArray, ComplexArray]:
         """Return displacements without and with what changes of the speed have struck, (n, c)."""
         steady = self.predictor.answer(speed)
-        moved = self.predictor.moved(steady, [
-            self.transient.at(stamp, told) if math.isfinite(told) else None
-            for stamp, told in zip(stamp_ns.tolist(), speed.tolist(), strict=True)])
+        moved = self.predictor.moved(steady, self.transient.at(stamp_ns, speed))
         return steady.displacement, moved.displacement
 
     def band(

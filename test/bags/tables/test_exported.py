@@ -78,6 +78,10 @@ def test_every_speed_has_a_row_for_every_channel_with_what_the_table_says(rows, 
         assert np.isnan(column(own, f'predicted_{other}')).all()
         np.testing.assert_allclose(column(own, 'predicted_phase_rad'),
                                    np.angle(predicted.displacement[:, at]), atol=1e-9)
+        # A machine that has always turned so answers steadily, of which nothing is said twice.
+        for quantity in (unit, 'phase_rad'):
+            np.testing.assert_array_equal(
+                column(own, f'steady_{quantity}'), column(own, f'predicted_{quantity}'))
 
 
 def test_what_was_measured_stands_beside_it_with_residual_band_and_zone(rows):

@@ -14,7 +14,7 @@ from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.transient.poles import fit
-from rotorsoil_ros.machine.transient.state import Transient
+from rotorsoil_ros.machine.transient.state import Struck, Transient
 
 from machines import elastic_machine, paper_machine
 
@@ -196,8 +196,9 @@ def test_all_channels_and_forces_share_the_poles(name, request):
             near = near[predictor.covers(near)]
             whole = predictor.predict(near)
             # Minus the steady response of every pole, -1 / A.
-            rest = predictor.moved(whole, [(1.0 / rate, np.ones(len(rate))) for rate in (
-                (1.0 - table.poles.slope) * (table.poles.decay - 1j * speed) for speed in near)])
+            rate = (1.0 - table.poles.slope) * (table.poles.decay - 1j * near[:, None])
+            rest = predictor.moved(whole, Struck(np.arange(len(near)), np.stack(
+                [1.0 / rate, np.ones(rate.shape)], axis=1)))
             for part in ('displacement', 'force'):
                 smooth, size = getattr(rest, part), np.abs(getattr(whole, part))
                 given = np.isfinite(smooth).all(axis=0)

@@ -18,11 +18,26 @@ def of_one(decay, strength=1.0, slope=0.0):
     return Poles(np.array([decay]), np.array([slope]), np.full((1, 1, 1), strength, dtype=complex))
 
 
+FIVE = Poles(np.array([-380.0 + 186j, -0.07 + 98j, -0.1 + 106j, -4.4 + 77j, -5.7 + 81j]),
+             np.array([0.0, -0.05, 0.05, -0.03, 0.02]), np.ones((5, 1, 1), dtype=complex))
+
+
 def followed(poles, time, speed):
     """Return deviations d, (n, k), 0 where there is none."""
     stamp_ns = np.rint(np.asarray(time) * SECOND).astype(np.int64)
-    found = Transient(poles).follow(stamp_ns, np.asarray(speed, dtype=float))
-    return np.array([np.zeros(len(poles)) if each is None else each[0] for each in found])
+    return told(Transient(poles), stamp_ns, np.asarray(speed, dtype=float))[:, 0]
+
+
+def told(transient, stamp_ns, speed):
+    """Return d and A d at every speed, (n, 2, k), 0 where nothing rings."""
+    return all_rows(transient.follow(stamp_ns, speed), len(speed), len(transient.poles))
+
+
+def all_rows(struck, count, poles):
+    found = np.zeros((count, 2, poles), dtype=complex)
+    if struck is not None:
+        found[struck.rows] = struck.weights
+    return found
 
 
 def test_step_is_the_integral_of_the_envelope():
@@ -137,18 +152,16 @@ def stepping(**changed):
     return stamp_ns, 95.0 + 2.0 * stamp_ns / SECOND
 
 
-def bits(found):
-    return [None if each is None else (each[0].tobytes(), each[1].tobytes()) for each in found]
-
-
 def test_parts_of_a_run_give_the_same_bits():
     stamp_ns, speed = stepping()
-    whole = Transient(of_one(-0.2 + 100j)).follow(stamp_ns, speed)
-    parts = Transient(of_one(-0.2 + 100j))
-    found = []
-    for part in np.split(np.arange(250), [1, 2, 70, 200]):
-        found += parts.follow(stamp_ns[part], speed[part])
-    assert bits(found) == bits(whole)
+    speed[100:120] = speed[100]  # and at a constant speed
+    for poles in (of_one(-0.2 + 100j), FIVE):
+        whole = told(Transient(poles), stamp_ns, speed)
+        parts = Transient(poles)
+        found = [told(parts, stamp_ns[part], speed[part])
+                 for part in np.split(np.arange(250), [1, 2, 70, 71, 110, 200])]
+        assert np.concatenate(found).tobytes() == whole.tobytes()
+        assert np.abs(whole[1:, 1]).min() > 0.0
 
 
 @pytest.mark.parametrize('jump_ns, begins', [
@@ -157,31 +170,31 @@ def test_a_long_gap_and_stamps_that_go_back_begin_anew(jump_ns, begins):
     stamp_ns, speed = stepping()
     stamp_ns = np.where(np.arange(250) < 200, stamp_ns, stamp_ns + jump_ns)
     transient = Transient(of_one(-0.05 + 100j))
-    found = transient.follow(stamp_ns, speed)
-    assert (found[200] is None) == begins
+    found = told(transient, stamp_ns, speed)
+    assert (not found[200].any()) == begins
     assert (int(stamp_ns[200]) in transient.began_ns) == begins
     if begins:
-        fresh = Transient(of_one(-0.05 + 100j)).follow(stamp_ns[200:], speed[200:])
-        assert bits(found[200:]) == bits(fresh)
+        fresh = told(Transient(of_one(-0.05 + 100j)), stamp_ns[200:], speed[200:])
+        assert found[200:].tobytes() == fresh.tobytes()
 
 
 def test_a_speed_without_an_answer_is_as_one_that_was_lost():
     stamp_ns, speed = stepping()
     gaps = np.arange(250) % 7 == 3
-    holed = Transient(of_one(-0.2 + 100j)).follow(stamp_ns, np.where(gaps, np.nan, speed))
-    lost = Transient(of_one(-0.2 + 100j)).follow(stamp_ns[~gaps], speed[~gaps])
-    assert bits([each for each, gap in zip(holed, gaps, strict=True) if not gap]) == bits(lost)
-    assert all(each is None for each, gap in zip(holed, gaps, strict=True) if gap)
+    holed = told(Transient(of_one(-0.2 + 100j)), stamp_ns, np.where(gaps, np.nan, speed))
+    lost = told(Transient(of_one(-0.2 + 100j)), stamp_ns[~gaps], speed[~gaps])
+    assert holed[~gaps].tobytes() == lost.tobytes()
+    assert not holed[gaps].any()
 
 
 def test_the_same_moment_told_twice_moves_nothing():
     decay = -0.2 + 100j
     transient = Transient(of_one(decay))
-    first, second = transient.follow(np.array([0, SECOND]), np.array([95.0, 99.0]))
-    assert first is None
-    [again] = transient.follow(np.array([SECOND]), np.array([99.5]))
-    envelope = second[0][0] - 1.0 / (decay - 99j)
-    assert again[0][0] - 1.0 / (decay - 99.5j) == pytest.approx(envelope, rel=1e-12)
+    first, second = told(transient, np.array([0, SECOND]), np.array([95.0, 99.0]))
+    assert not first.any()
+    [again] = told(transient, np.array([SECOND]), np.array([99.5]))
+    envelope = second[0, 0] - 1.0 / (decay - 99j)
+    assert again[0, 0] - 1.0 / (decay - 99.5j) == pytest.approx(envelope, rel=1e-12)
 
 
 def test_past_times_are_told_between_the_speeds():
@@ -190,9 +203,29 @@ def test_past_times_are_told_between_the_speeds():
     transient = Transient(of_one(-0.2 + 100j))
     transient.follow(stamp_ns, speed)
     fine_ns = np.arange(1250) * (SECOND // 250)
-    fine = Transient(of_one(-0.2 + 100j)).follow(fine_ns, 95.0 + 2.0 * fine_ns / SECOND)
-    for row in (3, 77, 901):
-        found = transient.at(int(fine_ns[row]), 95.0 + 2.0 * float(fine_ns[row]) / SECOND)
-        np.testing.assert_allclose(found[0], fine[row][0], rtol=1e-7)
-    assert transient.at(-1, 95.0) is None
-    assert transient.at(int(stamp_ns[-1]) + 11 * SECOND, 99.0) is None
+    fine = told(Transient(of_one(-0.2 + 100j)), fine_ns, 95.0 + 2.0 * fine_ns / SECOND)
+    rows = np.array([3, 77, 901])
+    found = transient.at(fine_ns[rows], 95.0 + 2.0 * fine_ns[rows] / SECOND)
+    np.testing.assert_array_equal(found.rows, np.arange(3))
+    np.testing.assert_allclose(found.weights[:, 0], fine[rows, 0], rtol=1e-7)
+    unknown = np.array([-1, stamp_ns[-1] + 11 * SECOND, fine_ns[3]])
+    assert transient.at(unknown, np.array([95.0, 99.0, math.nan])) is None
+
+
+def test_a_rest_is_kept_by_its_ends():
+    # Whoever asks what was before, within or after a rest is told the same, however long it was.
+    stamp_ns, speed = stepping()
+    speed = np.where(np.arange(250) < 100, speed, speed[100])
+    decay = of_one(-50.0 + 100j)
+    transient = Transient(decay)
+    away = told(transient, stamp_ns, speed)
+    assert away[99].any()
+    assert not away[150:].any()
+    assert len(transient._past) < 150
+    late = np.arange(250) * (SECOND // 50) + SECOND // 100
+    found = all_rows(transient.at(late, speed), 250, 1)
+    assert not found[150:].any()
+    moved = told(transient, stamp_ns[-1:] + SECOND // 50, speed[-1:] + 1.0)
+    begun = Transient(decay)
+    begun.follow(stamp_ns[-1:], speed[-1:])
+    assert moved.tobytes() == told(begun, stamp_ns[-1:] + SECOND // 50, speed[-1:] + 1.0).tobytes()
