@@ -13,7 +13,6 @@ import numpy as np
 
 import rotorsoil_ros
 from rotorsoil_ros.arrays import FloatArray
-from rotorsoil_ros.case.design.influence import Influence
 from rotorsoil_ros.case.design.margins import searched
 from rotorsoil_ros.case.design.report import Acceptance, DesignReport, HousingAnswer, NEAREST
 from rotorsoil_ros.case.machine import Machine
@@ -60,7 +59,8 @@ def write_design_report(machine: Machine, report: DesignReport, out: Path) -> No
 def design_page(machine: Machine, report: DesignReport) -> str:
     """Return the page."""
     case, rpm = report.case, f'{report.speed_rpm:.10g} rpm'
-    title = f'{case.name} at {rpm}: is this foundation right?'
+    name = case.name if case.berth is None else f'{case.name} of {case.berth.plant}'
+    title = f'{name} at {rpm}: is this foundation right?'
     return html.page(title, [
         f'<h1>{escape(title)}</h1>',
         html.verdict(_KINDS[report.verdict], str(report.verdict).capitalize(),
@@ -73,7 +73,7 @@ def design_page(machine: Machine, report: DesignReport) -> str:
         '<div class="two"><div>',
         f'<h2>Nearest critical speeds (looked for from {searched(report.modes)})</h2>',
         _modes(report), _stability(report), '</div><div>',
-        '<h2>What decides</h2>', _decides(report.influences), '</div></div>',
+        '<h2>What decides</h2>', _decides(report), '</div></div>',
         '<div class="two"><div>', '<h2>Inputs, given unless marked</h2>',
         html.listed(list(_given(report))),
         '<h2>The answer rests on</h2>', html.listed(_short(report.assumptions)), '</div><div>',
@@ -134,14 +134,16 @@ def _stability(report: DesignReport) -> str:
     return f'<p>{said[report.stable]}{split}</p>'
 
 
-def _decides(influences: Sequence[Influence]) -> str:
+def _decides(report: DesignReport) -> str:
+    influences = report.influences
     if not influences:
         return '<p>Nothing of the case is said to be uncertain, or there is no number.</p>'
     first = influences[0]
     rows = [[one.input.words, *(_number(1e3 * value) for value in (*one.ends, one.largest))]
             for one in influences[:_MOST_INPUTS]]
+    alone = '' if report.case.berth is None else f': the part of {escape(report.case.name)}'
     return (f'<p><b>{escape(first.input.words.capitalize())}</b>: each input alone, over all that '
-            'is known of it, moves the worst housing so [mm/s rms].</p>'
+            f'is known of it, moves the worst housing so [mm/s rms]{alone}.</p>'
             + html.table(['input', 'at its lowest', 'as given', 'at its highest', 'largest'],
                          rows))
 
@@ -161,10 +163,11 @@ def _given(report: DesignReport) -> Iterator[str]:
     for index, block in enumerate(case.foundations):
         place = f'foundations.{index}'
         (left, right), (near, far) = extents(block.contact)
-        plan = f'{right - left:.4g} x {far - near:.4g}'
-        yield (f'{block.name}: {plan} x {block.drawn_height:.3g} m'
-               f'{mark(f"{place}.height", f"{place}.half_width")}, {block.mass:.4g} kg'
-               f'{mark(f"{place}.mass")}')
+        size = f'{right - left:.4g} x {far - near:.4g} x {block.drawn_height:.3g} m'
+        if block.body is not None and not block.is_solid:
+            size = f'frame on {len(block.body.patches)} contacts'
+        yield (f'{block.name}: {size}{mark(f"{place}.height", f"{place}.half_width")}, '
+               f'{block.mass:.0f} kg{mark(f"{place}.mass")}')
     rotor = case.rotor
     diameter = max(max(section.outer_diameter) for section in rotor.shaft)
     # Of a rotor that was weighed only its parts are guesses.

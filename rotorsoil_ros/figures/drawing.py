@@ -1,8 +1,6 @@
 """The machine of a case, drawn to scale from the side and from its end."""
 
 from dataclasses import replace
-from itertools import pairwise
-import math
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -11,13 +9,13 @@ from matplotlib.patches import Circle as Round, Polygon, Rectangle as Box
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.ground.soil import extents
-from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.case.plant.berth import mounts
+from rotorsoil_ros.figures.site import draw_plan, frame
+from rotorsoil_ros.figures.strata import draw_ground, drawn_depth, sides
+from rotorsoil_ros.machine.flexible.lattice import Lattice
 from rotorsoil_ros.rotor.bearing import Bearing
-from rotorsoil_ros.rotor.disc import Disc
 
-STEEL, DISC, CONCRETE, SOIL = '#7d98b3', '#d9a441', '#c9c9c4', '#c8ad7f'
-ROCK = '#8f8f8f'
+STEEL, DISC, CONCRETE, _FRAME = '#7d98b3', '#d9a441', '#c9c9c4', '#8a8a85'
 HOUSING, STAND, SPRING = '#5b6770', '#a9a9a9', '#b03a2e'
 
 # A housing is drawn so many times as high and wide as the shaft in it, but not smaller than this
@@ -34,60 +32,75 @@ _WINDINGS = 4
 _SMALL = 5.0
 _EDGE: dict[str, Any] = {'edgecolor': 'black', 'linewidth': 0.6}
 _MEGA = 1e-6
-# Layers are told apart by their shade.
-_LAYERS = (SOIL, '#b39468', '#d8c39c', '#a88b62')
-# Of the height of the machine, that the ground below it may take; of a block, the gap beside it.
-_DEEPEST = 1.2
-_LEVEL = '#0072b2'
-_GAP = 0.06
 
 
 def machine_drawing(case: Case, *, width: float = 7.5) -> Figure:
-    """Draw shaft, discs, bearings, blocks and ground of a case, in a width in inches."""
-    beside = ''
+    """
+    Draw shaft, discs, bearings, blocks and ground of a case, in a width in inches.
+
+    Beside the view from the side is that along the shaft; of a shaft that stands and of machines
+    of a plant it is a plan, in a scale of its own.
+    """
+    site, has_plan = case, case.berth is not None or case.rotor.is_upright
     if case.berth is not None:
-        beside = ', its neighbours left out' + (
-            ', blocks not turned' if case.berth.is_turned else '')
         case = replace(case, foundations=case.berth.seen(case.foundations))
     left, right, reach, top = _extent(case)
+    depth = drawn_depth(case, top)
     # Room for the labels of discs above, and of bearings to the right.
-    depth = _drawn_depth(case, top)
-    across, up = right - left + 2.0 * reach, top + depth
-    height = min(max(0.25 * width + 0.83 * width * up / across, 0.39 * width), 7.4)
-    figure = Figure(figsize=(width, height),
-                    layout='constrained')
-    # Widths in the ratio of the limits: then both views have one scale.
-    side, end = figure.subplots(1, 2, width_ratios=[right - left, 2.0 * reach], sharey=True)
-    side.set(xlim=(left, right), ylim=(-depth, top), xlabel='y along the shaft [m]',
+    room, wide, tall = 0.25 * width, right - left, top + depth
+    if has_plan:
+        first, last, near, far = frame(site)
+        shape = max(tall / wide, (far - near) / (last - first))
+        ratios = [1.0, 1.0]
+        drawn = 0.42 * width * shape
+    else:
+        # Widths in the ratio of the limits: then both views have one scale.
+        ratios = [wide, 2.0 * reach]
+        drawn = 0.83 * width * tall / sum(ratios)
+    height = min(max(room + drawn, 0.39 * width), 7.4)
+    figure = Figure(figsize=(width, height), layout='constrained')
+    side, other = figure.subplots(1, 2, width_ratios=ratios, sharey=not has_plan)
+    side.set(xlim=(left, right), ylim=(-depth, top),
+             xlabel='x across [m]' if case.rotor.is_upright else 'y along the shaft [m]',
              ylabel='z above the contact [m]' if any(
                  one.depth for one in case.embedments) else 'z above the ground [m]')
-    end.set(xlim=(-reach, reach), xlabel='x across [m]')
     _draw_side(side, case, in_full=width > _SMALL)
-    _draw_end(end, case)
-    for axes in (side, end):
+    views = [side] if has_plan else [side, other]
+    if has_plan:
+        draw_plan(other, site)
+    else:
+        other.set(xlim=(-reach, reach), xlabel='x across [m]')
+        _draw_end(other, case)
+    for axes in views:
+        draw_ground(axes, case, words=axes is side)
+    for axes in (side, other):
         axes.set_aspect('equal')
-        axes.locator_params(axis='x', nbins=6 if axes is side else 3)
+        axes.locator_params(axis='x', nbins=6 if axes is side else 4)
         axes.spines[['top', 'right']].set_visible(False)
-        _draw_ground(axes, case, words=axes is side)
-    if width <= _SMALL:
-        return figure
+    if width > _SMALL:
+        figure.suptitle(_title(case), fontsize=9)
+    return figure
+
+
+def _title(case: Case) -> str:
     given = all(block.height is not None for block in case.foundations)
     note = '' if given else ', heights of blocks after their centre of gravity'
-    figure.suptitle(f'{case.name}: {_support(case)}\nto scale, discs as solid cylinders of their '
-                    f'mass and inertia{note}{beside};\nbearings and pedestals schematic',
-                    fontsize=9)
-    return figure
+    if case.berth is not None and case.berth.is_turned and not case.rotor.is_upright:
+        note += ', blocks not turned'
+    return (f'{case.name}: {_support(case)}\nto scale, discs as solid cylinders of their '
+            f'mass and inertia{note};\nbearings and pedestals schematic')
 
 
 def _extent(case: Case) -> tuple[float, float, float, float]:
     """Return the left and right end of the side view, half the end view, and the top [m]."""
-    rotor = case.rotor
-    radius = max([_cylinder(disc)[0] for disc in rotor.discs], default=0.0)
-    top = rotor.shaft_height + radius
-    ends, reach = [0.0, rotor.length], max(radius, 0.35 * rotor.shaft_height)
+    rotor, upright = case.rotor, case.rotor.is_upright
+    radius = max([disc.radius for disc in rotor.discs], default=0.0)
+    top = rotor.shaft_height + (rotor.length if upright else radius)
+    ends = [-radius, radius] if upright else [0.0, rotor.length]
+    reach = max(radius, 0.35 * rotor.shaft_height)
     for block in case.foundations:
-        ends += _sides(block, across=False)
-        reach = max(reach, *(abs(side) for side in _sides(block, across=True)))
+        ends += sides(block, across=upright)
+        reach = max(reach, *(abs(side) for side in sides(block, across=True)))
     edge = 0.05 * (max(ends) - min(ends))
     return min(ends) - edge, max(ends) + edge, reach + edge, top + 3.0 * edge
 
@@ -106,68 +119,126 @@ def _support(case: Case) -> str:
             f'{case.soil.shear_wave_speed:.0f} m/s')
 
 
-def _draw_side(axes: Axes, case: Case, *, in_full: bool) -> None:
-    rotor, shaft = case.rotor, case.rotor.shaft_height
+def _box(
+    axes: Axes, case: Case, along: tuple[float, float], beside: tuple[float, float],
+    **style: Any,
+) -> None:
+    """Draw what reaches from one place along the shaft to another, and so far beside it."""
+    (first, last), (low, high), up = along, beside, case.rotor.shaft_height
+    if case.rotor.is_upright:
+        axes.add_patch(Box((low, up + first), high - low, last - first, **style, **_EDGE))
+    else:
+        axes.add_patch(Box((first, up + low), last - first, high - low, **style, **_EDGE))
+
+
+def _place(case: Case, along: float, beside: float) -> tuple[float, float]:
+    """Return where a place along and beside the shaft is in the view from the side."""
+    up = case.rotor.shaft_height
+    return (beside, up + along) if case.rotor.is_upright else (along, up + beside)
+
+
+def _name(case: Case, station: str) -> str:
+    """Return the name of a station as its machine calls it."""
+    return station if case.berth is None else station.removeprefix(f'{case.name}_')
+
+
+def _draw_blocks(axes: Axes, case: Case, *, across: bool, words: bool) -> None:
+    """Draw blocks and rafts as they are, frames by their places and lines between them."""
     for block in case.foundations:
-        (first, last), height = _sides(block, across=False), block.drawn_height
-        axes.add_patch(Box((first, 0.0), last - first, height, zorder=1,
-                           facecolor=CONCRETE, **_EDGE))
-        left, right = _sides(block, across=True)
-        if not left < 0.0 < right:
-            continue  # beside the shaft, behind the others: the view along it has its name
-        axes.annotate(f'{block.name}, {block.mass:g} kg', (0.5 * (first + last), 0.5 * height),
-                      ha='center', va='center', fontsize=7)
-    for bearing in rotor.bearings:
-        size = _housing_size(case, bearing)
-        foot = _foot(case, bearing)
-        _draw_support(axes, bearing, bearing.position, width=size, foot=foot, shaft=shaft,
-                      size=size)
-        # At the foot: clear of the discs above and of the block's name.
-        words = _words(bearing) if in_full else bearing.name
-        axes.annotate(words, (bearing.position + 0.5 * size, foot), xytext=(3, 4),
-                      textcoords='offset points', fontsize=6.5, va='bottom', zorder=7)
+        first, last = sides(block, across=across)
+        if block.is_solid:
+            axes.add_patch(Box((first, 0.0), last - first, block.drawn_height, zorder=1,
+                               facecolor=CONCRETE, **_EDGE))
+        else:
+            lattice = Lattice.whole(block, mounts(case))
+            for line in lattice.lines(np.zeros_like(lattice.places)):
+                axes.plot(*line[:, [0 if across else 1, 2]].T, color=_FRAME, linewidth=3.0,
+                          solid_capstyle='round', zorder=1)
+        left, right = sides(block, across=True)
+        # One beside the shaft is behind the others: the view along it has its name.
+        if (left < 0.0 < right) is words:
+            mass = f', {block.mass:.0f} kg' if words else ''
+            axes.annotate(f'{block.name}{mass}', (0.5 * (first + last), 0.5 * block.drawn_height),
+                          ha='center', va='center', fontsize=7, zorder=1.5)
+
+
+def _draw_side(axes: Axes, case: Case, *, in_full: bool) -> None:
+    rotor, upright = case.rotor, case.rotor.is_upright
+    left, right = axes.get_xlim()
+    close = (_CLOSE if in_full else 1.6 * _CLOSE) * (right - left)
+    _draw_blocks(axes, case, across=upright, words=True)
+    before, raised = None, False
+    for bearing in sorted(rotor.bearings, key=lambda bearing: bearing.position):
+        size, foot = _housing_size(case, bearing), _foot(case, bearing)
+        words = _words(bearing, _name(case, bearing.name)) if in_full else (
+            _name(case, bearing.name))
+        if upright:
+            _draw_standing(axes, case, bearing, size=size, foot=foot)
+            place, shift = _place(case, bearing.position, 1.2 * size), (3, 0)
+        else:
+            _draw_support(axes, bearing, bearing.position, width=size, foot=foot,
+                          shaft=rotor.shaft_height, size=size)
+            # At the foot: clear of the discs above and of the block's name.
+            raised = before is not None and not raised and bearing.position - before < close
+            place, shift = (bearing.position + 0.5 * size, foot), (3, 14 if raised else 4)
+            before = bearing.position
+        axes.annotate(words, place, xytext=shift, textcoords='offset points', fontsize=6.5,
+                      va='center' if upright else 'bottom', zorder=7)
     _draw_shaft(axes, case)
-    _draw_discs(axes, case)
+    _draw_discs(axes, case, close=close)
     for probe in rotor.probes:
-        axes.plot(probe.position, shaft, 'v', color='crimson', markersize=5, zorder=5)
-        _label(axes, probe.name, probe.position, shaft, points=_BESIDE)
+        place = _place(case, probe.position, 0.0)
+        axes.plot(*place, 'v', color='crimson', markersize=5, zorder=5)
+        _label(axes, _name(case, probe.name), *place, points=_BESIDE)
 
 
 def _draw_shaft(axes: Axes, case: Case) -> None:
-    start, shaft = 0.0, case.rotor.shaft_height
+    start = 0.0
     for section in case.rotor.shaft:
         (left, right), stop = section.outer_diameter, start + section.length
         axes.add_patch(Polygon(
-            [(start, shaft - left / 2), (stop, shaft - right / 2), (stop, shaft + right / 2),
-             (start, shaft + left / 2)], zorder=3, facecolor=STEEL, **_EDGE))
+            [_place(case, *corner) for corner in (
+                (start, -left / 2), (stop, -right / 2), (stop, right / 2), (start, left / 2))],
+            zorder=3, facecolor=STEEL, **_EDGE))
         start = stop
 
 
-def _draw_discs(axes: Axes, case: Case) -> None:
-    rotor, shaft = case.rotor, case.rotor.shaft_height
-    left, right = axes.get_xlim()
-    before, raised, close = None, False, _CLOSE * (right - left)
-    for disc in sorted(rotor.discs, key=lambda disc: disc.position):
-        radius, thickness = _cylinder(disc)
-        thickness = max(thickness, 0.008 * rotor.length)
-        axes.add_patch(Box((disc.position - thickness / 2, shaft - radius), thickness,
-                           2.0 * radius, zorder=4, facecolor=DISC, **_EDGE))
+def _draw_discs(axes: Axes, case: Case, *, close: float) -> None:
+    before, raised = None, False
+    for disc in sorted(case.rotor.discs, key=lambda disc: disc.position):
+        thickness = max(disc.thickness, 0.008 * case.rotor.length)
+        _box(axes, case, (disc.position - thickness / 2, disc.position + thickness / 2),
+             (-disc.radius, disc.radius), zorder=4, facecolor=DISC)
+        words = f'{_name(case, disc.name)}\n{disc.mass:.4g} kg'
+        if case.rotor.is_upright:
+            # Clear of the columns.
+            beside = max(disc.radius, *(_housing_size(case, one) for one in case.rotor.bearings))
+            axes.annotate(words, _place(case, disc.position, -beside), xytext=(-3, 0),
+                          textcoords='offset points', fontsize=7, ha='right', va='center')
+            continue
         # Of two close ones the second says it higher up.
         raised = before is not None and not raised and disc.position - before < close
-        _label(axes, f'{disc.name}\n{disc.mass:.4g} kg', disc.position, shaft + radius,
+        _label(axes, words, *_place(case, disc.position, disc.radius),
                points=_ABOVE if raised else _BESIDE)
         before = disc.position
 
 
+def _draw_standing(
+    axes: Axes, case: Case, bearing: Bearing, *, size: float, foot: float,
+) -> None:
+    """Draw the housing of a shaft that stands, held by a column on either side."""
+    top = bearing.position + 0.5 * size
+    _box(axes, case, (bearing.position - 0.5 * size, top), (-size, size), zorder=2.5,
+         facecolor=HOUSING)
+    colour = STAND if bearing.pedestal is None else SPRING
+    for low, high in ((-size, -0.8 * size), (0.8 * size, size)):
+        _box(axes, case, (foot - case.rotor.shaft_height, top), (low, high), zorder=2,
+             facecolor=colour)
+
+
 def _draw_end(axes: Axes, case: Case) -> None:
     shaft = case.rotor.shaft_height
-    for block in case.foundations:
-        left, right = _sides(block, across=True)
-        axes.add_patch(Box((left, 0.0), right - left, block.drawn_height, zorder=1,
-                           facecolor=CONCRETE, **_EDGE))
-        if not left < 0.0 < right:
-            axes.annotate(block.name, (0.5 * (left + right), 0.5 * block.drawn_height),
-                          ha='center', va='center', fontsize=7)
+    _draw_blocks(axes, case, across=True, words=False)
     # One behind the other: the one that shows most stands for all.
     flexible = [bearing for bearing in case.rotor.bearings if bearing.pedestal is not None]
     for bearing in (flexible or list(case.rotor.bearings))[:1]:
@@ -175,7 +246,7 @@ def _draw_end(axes: Axes, case: Case) -> None:
         _draw_support(axes, bearing, 0.0, width=max(size, 0.5 * (shaft - foot)), foot=foot,
                       shaft=shaft, size=size)
     for disc in case.rotor.discs:
-        axes.add_patch(Round((0.0, shaft), _cylinder(disc)[0], zorder=3, facecolor=DISC,
+        axes.add_patch(Round((0.0, shaft), disc.radius, zorder=3, facecolor=DISC,
                              alpha=0.5, **_EDGE))
     diameter = max(max(section.outer_diameter) for section in case.rotor.shaft)
     axes.add_patch(Round((0.0, shaft), diameter / 2, zorder=4, facecolor=STEEL, **_EDGE))
@@ -214,14 +285,14 @@ def _draw_support(
     axes.plot([right - 0.1 * size, right + 0.1 * size], [0.5 * (low + high)] * 2, **line)
 
 
-def _words(bearing: Bearing) -> str:
+def _words(bearing: Bearing, name: str) -> str:
     """Return the name of a bearing and what is known of its pedestal."""
     pedestal = bearing.pedestal
     if pedestal is None:
-        return bearing.name
+        return name
     (x, z), (across, up) = np.diag(pedestal.mass), np.diag(pedestal.stiffness)
     mass = f'{x:.3g} kg' if x == z else f'{x:.3g} (x), {z:.3g} kg (z)'
-    return (f'{bearing.name}\npedestal: {mass}\n{_MEGA * across:.3g} (x), {_MEGA * up:.3g} (z) '
+    return (f'{name}\npedestal: {mass}\n{_MEGA * across:.3g} (x), {_MEGA * up:.3g} (z) '
             'N/um')
 
 
@@ -231,76 +302,6 @@ def _housing_size(case: Case, bearing: Bearing) -> float:
     index = int(np.clip(np.searchsorted(ends, bearing.position) - 1, 0, len(ends) - 2))
     diameter = max(case.rotor.shaft[index].outer_diameter)
     return max(_HOUSING * diameter, _LEAST_HOUSING * case.rotor.shaft_height)
-
-
-def _drawn_depth(case: Case, top: float) -> float:
-    """Return how much of what lies below the contact is drawn [m]: layers, rock that may be."""
-    layers = 0.0 if case.ground is None else case.ground.depth
-    shallowest = (case.uncertainty.rock_depth or (0.0,))[0]
-    if not layers and not shallowest:
-        return 0.1 * top
-    below = max(layers, shallowest) - _surface(case)
-    return min(1.15 * below, _DEEPEST * top) if below > 0.0 else 0.3 * top
-
-
-def _surface(case: Case) -> float:
-    """Return the height of the ground above the contact of the first block [m]."""
-    return case.embedments[0].depth if case.embedments else 0.0
-
-
-def _draw_ground(axes: Axes, case: Case, *, words: bool) -> None:
-    """Draw layers from the surface down, and the hole of each block with what touches its wall."""
-    left, right = axes.get_xlim()
-    bottom, surface = axes.get_ylim()[0], _surface(case)
-    layers = () if case.ground is None else case.ground.layers
-    on_rock = case.support.model == 'rigid' or (
-        case.ground is not None and case.ground.below is None)
-    ends = [surface - depth for depth in (case.ground.interfaces if case.ground else ())]
-    for index, (high, low) in enumerate(pairwise([surface, *ends, min(bottom, *ends, 0.0) - 1.0])):
-        is_rock = on_rock and index == len(layers)
-        axes.add_patch(Box(
-            (left, max(low, bottom)), right - left, max(high - max(low, bottom), 0.0), zorder=0,
-            linewidth=0.0, facecolor=ROCK if is_rock else _LAYERS[index % len(_LAYERS)],
-            hatch='///' if is_rock else '...', edgecolor='white'))
-        if layers and words and high > bottom:
-            soil = None if is_rock else case.ground.soils[index] if case.ground else None
-            axes.annotate(
-                'rigid rock' if soil is None else f'c_s = {soil.shear_wave_speed:.0f} m/s',
-                (left, 0.5 * (high + max(low, bottom))), xytext=(3, 0), va='center', fontsize=6.5,
-                textcoords='offset points', zorder=1.5,
-                bbox={'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0})
-    axes.axhline(surface, color='black', linewidth=0.8, zorder=0.5)
-    for end in ends:
-        axes.axhline(end, color='black', linewidth=0.6, linestyle=':', zorder=0.5)
-    if surface:
-        _draw_gaps(axes, case, across=not words)
-    spread = case.uncertainty
-    if spread.ground_water:
-        _draw_level(axes, surface, 'ground water may stand here', words=words)
-    if spread.rock_depth is not None and surface - spread.rock_depth[0] > bottom:
-        _draw_level(axes, surface - spread.rock_depth[0], 'from here on there may be rock',
-                    words=words)
-
-
-def _draw_level(axes: Axes, height: float, text: str, *, words: bool) -> None:
-    """Draw what is not known to be at a height, at the edge that layers leave free."""
-    axes.axhline(height, color=_LEVEL, linewidth=1.2, linestyle='--', zorder=0.6)
-    if words:
-        axes.annotate(
-            text, (axes.get_xlim()[1], height), xytext=(-3, -2), va='top', ha='right',
-            fontsize=6.5, color=_LEVEL, textcoords='offset points', zorder=1.5,
-            bbox={'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0})
-
-
-def _draw_gaps(axes: Axes, case: Case, *, across: bool) -> None:
-    """Draw where the wall of a block stands free in the ground."""
-    for block, embedment in zip(case.foundations, case.embedments, strict=True):
-        first, last = _sides(block, across=across)
-        wide = _GAP * _half(block, across=across)
-        for edge in (first - wide, last):
-            axes.add_patch(Box((edge, embedment.depth - embedment.free_depth), wide,
-                               embedment.free_depth, zorder=0.4, facecolor='white',
-                               linewidth=0.0))
 
 
 def _label(axes: Axes, text: str, along: float, height: float, *, points: int) -> None:
@@ -314,24 +315,3 @@ def _foot(case: Case, bearing: Bearing) -> float:
     """Return the height of what a bearing stands on [m]."""
     return next((block.drawn_height for block in case.foundations
                  if block.name == bearing.foundation), 0.0)
-
-
-def _sides(block: Foundation, *, across: bool) -> tuple[float, float]:
-    """Return where a block begins and ends, across the shaft or along it [m]."""
-    first, last = extents(block.contact)[0 if across else 1]
-    centre = block.centre_x if across else block.centre_y
-    return centre + first, centre + last
-
-
-def _half(block: Foundation, *, across: bool) -> float:
-    first, last = _sides(block, across=across)
-    return 0.5 * (last - first)
-
-
-def _cylinder(disc: Disc) -> tuple[float, float]:
-    """Return radius and thickness of the solid cylinder with the mass and inertia of a disc."""
-    if not disc.mass > 0.0:
-        return 0.0, 0.0
-    square = 2.0 * disc.polar_inertia / disc.mass
-    thickness = 12.0 * disc.diametral_inertia / disc.mass - 3.0 * square
-    return math.sqrt(square), float(np.sqrt(max(thickness, 0.0)))

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, require
 from rotorsoil_ros.ground.soil import Contact
-from rotorsoil_ros.machine.flexible.body import FlexibleBody
+from rotorsoil_ros.machine.flexible.body import FlexibleBody, GREEN, WINKLER
 from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 
 # Young's modulus of what most blocks are made of [Pa].
@@ -83,6 +83,11 @@ class Foundation:
         for axis, value in zip('xyz', self.inertia, strict=True):
             require(0.0 <= value < math.inf, f'inertia about {axis}', '>= 0 kg m^2 and finite',
                     value)
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether it fills its outline: blocks and rafts do, frames on footings do not."""
+        return self.body is None or self.body.bed in (WINKLER, GREEN)
 
     @property
     def drawn_height(self) -> float:

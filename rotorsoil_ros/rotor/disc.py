@@ -39,6 +39,18 @@ class Disc:
         polar = mass * (outer_diameter**2 + inner_diameter**2) / 8.0
         return cls(name, position, mass, polar / 2.0 + mass * width**2 / 12.0, polar)
 
+    @property
+    def radius(self) -> float:
+        """Radius of the solid cylinder of its mass and inertia [m]."""
+        return math.sqrt(2.0 * self.polar_inertia / self.mass) if self.mass > 0.0 else 0.0
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of that cylinder; 0 of one that is thinner than thin [m]."""
+        square = (12.0 * self.diametral_inertia / self.mass - 3.0 * self.radius**2
+                  if self.mass > 0.0 else 0.0)
+        return math.sqrt(max(square, 0.0))
+
 
 def permissible_unbalance(*, grade: float, mass: float, speed: float) -> float:
     """

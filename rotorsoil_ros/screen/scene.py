@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-import math
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -17,7 +16,6 @@ from rotorsoil_ros.machine.flexible.lattice import Lattice
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.rotor.assembly import Rotor
-from rotorsoil_ros.rotor.disc import Disc
 
 SHAFT_POINTS = 61
 ORBIT_POINTS = 33
@@ -99,7 +97,7 @@ class Line:
         self.name = name
         places = [(across(bearing.name, JOURNAL), bearing.position, 0.0)
                   for bearing in rotor.bearings]
-        places += [(across(disc.name), disc.position, disc_radius(disc)) for disc in rotor.discs]
+        places += [(across(disc.name), disc.position, disc.radius) for disc in rotor.discs]
         # What moves with a housing, or is seen from one side, is no place of the shaft.
         places += [(across(probe.name), probe.position, 0.0) for probe in rotor.probes
                    if probe.angle is None and not probe.relative_to]
@@ -242,11 +240,6 @@ class Scene:
                 last = round_scale(LARGEST_SHARE * self.longest / size)
             scales[number] = last
         return scales
-
-
-def disc_radius(disc: Disc) -> float:
-    """Return the radius of the uniform disc with this mass and polar inertia [m]."""
-    return math.sqrt(2.0 * disc.polar_inertia / disc.mass) if disc.mass > 0.0 else 0.0
 
 
 def round_scale(wanted: float) -> float:

@@ -4,7 +4,7 @@ from io import BytesIO
 from pathlib import Path
 import re
 
-from matplotlib.patches import Rectangle as Box
+from matplotlib.patches import Circle as Round, Rectangle as Box
 import numpy as np
 import pytest
 
@@ -67,6 +67,32 @@ def test_block_and_wheel_stand_where_the_case_says():
     assert wheel.get_height() == pytest.approx(2.0 * np.sqrt(2.0 * 51.0 / 320.0))
     assert wheel.get_x() + 0.5 * wheel.get_width() == pytest.approx(1.6)
     assert wheel.get_y() + 0.5 * wheel.get_height() == pytest.approx(2.0)
+
+
+def test_a_shaft_that_stands_is_drawn_standing_beside_a_plan():
+    case = load(FAN, ['rotor.orientation=vertical', 'rotor.shaft_height=1.3'])
+    side, plan = machine_drawing(case).axes
+    wheel = max((patch for patch in side.patches if isinstance(patch, Box)),
+                key=lambda box: box.get_y() + box.get_height())
+    radius = np.sqrt(2.0 * 51.0 / 320.0)
+    assert (wheel.get_x(), wheel.get_width()) == pytest.approx((-radius, 2.0 * radius))
+    assert wheel.get_y() + 0.5 * wheel.get_height() == pytest.approx(1.3 + 1.6)
+    assert side.get_ylim()[1] > 1.3 + 1.7
+    rings = [patch.get_radius() for patch in plan.patches if isinstance(patch, Round)]
+    assert max(rings) == pytest.approx(radius)
+
+
+def test_every_machine_of_a_plant_is_in_the_plan():
+    case = load(CONFIG / 'fan_house.yaml', [
+        'source=fan_1', 'machines.1.place={x: 1.25, y: 0.8, heading: 90 deg}'])
+    side, plan = machine_drawing(case).axes
+    assert {'fan_1', 'fan_2'} <= {text.get_text() for text in plan.texts}
+    shafts = [line.get_xydata() for line in plan.get_lines() if len(line.get_xydata()) == 2]
+    length = case.rotor.length
+    for ends in ([(-1.25, -0.2), (-1.25, length - 0.2)], [(1.25, 0.8), (1.25 - length, 0.8)]):
+        assert any(np.allclose(ends, shaft) for shaft in shafts), ends
+    # Stations are called as their machine calls them.
+    assert 'drive_end' in {text.get_text() for text in side.texts}
 
 
 def test_bode_shows_micrometres_and_degrees_of_the_table(fan):

@@ -99,6 +99,15 @@ class Lattice:
                    np.array(rows).reshape(-1, 3, len(channels)),
                    np.array(edges, dtype=int).reshape(-1, 2))
 
+    @classmethod
+    def whole(cls, block: Foundation, mounts: Sequence[Mount]) -> 'Lattice':
+        """Return all places, as if all channels were known."""
+        assert block.body is not None
+        housings = [channel for mount in mounts
+                    for channel in across(mount.bearing.name, HOUSING)]
+        contacts, probes = block.body.channels(block.name)
+        return cls.of(block, mounts, (*housings, *contacts, *probes))
+
     def moved(self, motion: FloatArray | ComplexArray) -> np.ndarray:
         """Return how the places move, (..., k, 3), where channels move by (..., c)."""
         return np.asarray(motion @ self.follow.reshape(-1, self.follow.shape[-1]).T).reshape(
