@@ -1,6 +1,10 @@
 """The shipped foundations are what their script makes, and they bend as they should."""
 
+from dataclasses import replace
 from pathlib import Path
+import re
+import shlex
+import shutil
 
 import build
 import numpy as np
@@ -8,6 +12,7 @@ import pytest
 import scipy.io
 
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.cli import main
 from rotorsoil_ros.figures.bending import bending_figure
 
 HERE = Path(__file__).parent
@@ -41,14 +46,29 @@ def test_a_column_of_the_frame_is_a_cantilever_of_the_textbook():
 def test_example_bends_where_a_rigid_body_would_not(file, settings, tmp_path):
     machine = Machine.load(HERE / file, cache_directory=tmp_path, overrides=settings)
     support = machine.model.support
-    body = machine.model.foundations[0].body
+    [block] = machine.model.foundations
     speed = np.array([machine.case.speed_range[1]])
-    stiff = body.stiffer(1e6)
-    seats = [support.standing(speed).receptance[0], type(support)(
-        support.bearings, support.shaft_height,
-        [one if one.body is None else type(one)(**{
-            name: getattr(one, name) for name in one.__slots__} | {'body': stiff})
-         for one in support.foundations], support.soil_models, support.place,
-        support.burden).standing(speed).receptance[0]]
+    stiff = replace(support, foundations=[replace(block, body=block.body.stiffer(1e6))])
+    seats = [one.standing(speed).receptance[0] for one in (support, stiff)]
     assert np.abs(seats[0] - seats[1]).max() > 0.05 * np.abs(seats[0]).max()
     assert len(bending_figure(machine.case, machine.model).axes) >= 1
+
+
+def test_commands_of_the_readme_run_and_print_what_is_shown(tmp_path, monkeypatch, capsys):
+    for file in HERE.glob('*.[cmy][sta][vxm]*'):
+        shutil.copy(file, tmp_path)
+    # The fans are those of the shipped case.
+    house = (tmp_path / 'raft_house.yaml').read_text()
+    shipped = HERE.parents[1] / 'config' / 'plant_fan.yaml'
+    (tmp_path / 'raft_house.yaml').write_text(house.replace('../../config/plant_fan.yaml',
+                                                            str(shipped)))
+    monkeypatch.chdir(tmp_path)
+    [block] = re.findall(r'```console\n(.*?)```', (HERE / 'README.md').read_text(), re.DOTALL)
+    for example in block.split('$ ')[1:]:
+        command, *expected = example.strip().splitlines()
+        program, *arguments = shlex.split(command)
+        assert (program, main(arguments)) == ('rotorsoil', 0), command
+        said = capsys.readouterr().out
+        assert all(line in said for line in expected), command
+    header = (tmp_path / 'raft_seats.csv').read_text().partition('\n')[0]
+    assert 'fan_1_drive_end_x__fan_2_fan_end_z_re' in header

@@ -19,6 +19,7 @@ from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.machine.transient.state import Transient
 from rotorsoil_ros.machine.transmissibility import Transmissibility
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
@@ -138,12 +139,7 @@ class Machine(ModalAnswers):
 
         """
         own = self.model.own_seats
-        found = self.model.support.standing(
-            hz_to_rad_s(numbers('hz', hz))).receptance[:, own, own]
-        if not np.all(np.isfinite(found)):
-            raise NotSolvedError('the foundation has no finite receptance: a resonance without '
-                                 'damping is hit, or nothing holds it')
-        return found
+        return seats_moved(self.model.support, hz)[:, own, own]
 
     def bearings(self, *, rpm: Numbers) -> tuple[BearingStates, ...]:
         """
@@ -336,6 +332,15 @@ class Machine(ModalAnswers):
         """Return what the predictions under this name and this unbalance, (p,), rest on."""
         return models.description(self.case, self.model, self.table, name, unbalance)
 
+
+
+def seats_moved(support: Support, hz: Numbers) -> ComplexArray:
+    """Return how all seats of a support move by forces on them, as `seat_receptance` does."""
+    found = support.standing(hz_to_rad_s(numbers('hz', hz))).receptance
+    if not np.all(np.isfinite(found)):
+        raise NotSolvedError('the foundation has no finite receptance: a resonance without '
+                             'damping is hit, or nothing holds it')
+    return found
 
 
 def load(

@@ -9,6 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.plant.together import Plant, sources_of
 from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.cli.arguments.options import PLANT, Sweep
@@ -64,13 +65,15 @@ def compliance(arguments: Namespace) -> int:
 
 
 def seats(arguments: Namespace) -> int:
-    """Write the receptance of what the bearings stand on, without the rotor."""
-    machine = machine_of(arguments)
-    names = machine.seats
+    """Write the receptance of what the bearings stand on, all of a plant, without rotors."""
+    standing: Machine | Plant = machine_of(arguments) if not sources_of(
+        arguments.case, arguments.overrides) else Plant.load(
+        arguments.case, cache_directory=arguments.cache, overrides=arguments.overrides)
+    names = standing.seats
     plant = units_of(arguments) == PLANT
 
     def rows(omega: FloatArray) -> FloatArray:
-        found = machine.seat_receptance(hz=rad_s_to_hz(omega))
+        found = standing.seat_receptance(hz=rad_s_to_hz(omega))
         key = rad_s_to_hz(omega) if plant else omega
         return np.concatenate([key[:, None], complex_columns(
             found.reshape(len(omega), len(names) ** 2))], axis=1)

@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, Numbers
 from rotorsoil_ros.case import document
-from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.machine import Machine, seats_moved
 from rotorsoil_ros.case.quantities import is_name
-from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.channel import across, Channel
 from rotorsoil_ros.errors import InputError, RotorSoilError
+from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.prediction import columns_of
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, rpm_to_rad_s, to_mm_s_rms
 
@@ -166,6 +167,39 @@ class Plant:
         berths = {name: machine.case.berth for name, machine in self.machines.items()}
         return {name: float(rad_s_to_rpm(berth.rated_speed))
                 for name, berth in berths.items() if berth is not None}
+
+    @property
+    def _support(self) -> Support:
+        """The blocks below all bearings, the same for every machine."""
+        return next(iter(self.machines.values())).model.support
+
+    @property
+    def seats(self) -> tuple[Channel, ...]:
+        """What `seat_receptance` is over: x and z of every bearing of every machine."""
+        return tuple(channel for bearing in self._support.bearings
+                     for channel in across(bearing.name))
+
+    def seat_receptance(self, *, hz: Numbers) -> ComplexArray:
+        """
+        Solve for the motion of what all bearings stand on, without any rotor.
+
+        Parameters
+        ----------
+        hz : float or (n,) floats
+            Frequencies [Hz].
+
+        Returns
+        -------
+        (n, 2 b, 2 b) complex array
+            Displacement per force over `seats`, response first [m/N].
+
+        Raises
+        ------
+        OutOfTableError, NotSolvedError
+            As `Machine.seat_receptance`.
+
+        """
+        return seats_moved(self._support, hz)
 
     def shaken(self, *, rpm: Mapping[str, float] | None = None) -> Shaken:
         """

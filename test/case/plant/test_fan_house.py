@@ -393,3 +393,39 @@ def test_damping_of_a_source_is_divided_wherever_it_stands_in_the_file(house):
     put_in = math.pi * np.imag(np.conj(force) * moved.displacement[0, wheel]).sum()
     # Bearings of the neighbour take what is missing.
     assert float(second.total[0]) == pytest.approx(-float(put_in), rel=5e-3)
+
+
+def test_seats_of_a_plant_are_those_of_all_machines_at_once(house, cache, capsys):
+    found = house.seat_receptance(hz=[10.0, 24.0])
+    assert [str(seat) for seat in house.seats] == [
+        f'{fan}_{end}_{axis}' for fan in ('fan_1', 'fan_2') for end in ('drive_end', 'fan_end')
+        for axis in 'xz']
+    # Where one machine pushes another moves as if it were the other way round.
+    np.testing.assert_allclose(found, found.swapaxes(1, 2), rtol=1e-9)
+    for number, machine in enumerate(house.machines.values()):
+        own = slice(4 * number, 4 * number + 4)
+        np.testing.assert_allclose(
+            machine.seat_receptance(hz=[10.0, 24.0]), found[:, own, own], rtol=1e-12)
+    assert main(['seats', str(HOUSE), '--hz', '10:24:2', '-o', '-', '--cache', str(cache)]) == 0
+    header, *rows = capsys.readouterr().out.splitlines()
+    assert header.split(',')[:2] == ['omega_rad_s', 'fan_1_drive_end_x__fan_1_drive_end_x_re']
+    told = np.array([row.split(',') for row in rows], dtype=float)
+    np.testing.assert_allclose(told[:, 1::2] + 1j * told[:, 2::2], found.reshape(2, -1))
+
+
+def test_seats_of_a_rigid_block_follow_its_receptance(house):
+    """The seats of both fans ride on one block: R (N^-1 - w^2 M)^-1 R^T, by hand."""
+    [block] = house.machines['fan_1'].case.foundations
+    omega = 2.0 * np.pi * 24.0
+    model = house.machines['fan_1'].model
+    [soil] = model.support.soils
+    dynamic = np.linalg.inv(soil.compliance(np.array([omega]))[0]) - omega**2 * block.mass_matrix
+    rows = []
+    for fan in house.machines.values():
+        place = fan.case.berth.place
+        for bearing in fan.case.rotor.bearings:
+            x, y = place.x, place.y + bearing.position
+            rows += [[1.0, 0.0, 0.0, 0.0, 2.0, -y], [0.0, 0.0, 1.0, y, -x, 0.0]]
+    rows = np.array(rows)
+    np.testing.assert_allclose(house.seat_receptance(hz=24.0)[0],
+                               rows @ np.linalg.solve(dynamic, rows.T), rtol=1e-9, atol=1e-18)
