@@ -88,15 +88,15 @@ def compare(
 
     """
     wish, log = wish or Wish(), Path(log)
-    inputs = Inputs.of(log, machine=wish.machine, speed=wish.speed)
-    if not inputs.is_measured:
-        raise InputError(f'{log}: {inputs.machine}: nothing measured in the log (topics '
-                         f'{inputs.machine}/measured/...)')
-    descriptions = inputs.descriptions()
     if isinstance(case, Machine):
         cache_directory, case = cache_directory or case.directory, case.case
     elif isinstance(case, (Path, str)):
         case = config.load(Path(case), cache_directory=cache_directory)
+    inputs = Inputs.of(log, machine=wish.machine, of=case, speed=wish.speed)
+    if not inputs.is_measured:
+        raise InputError(f'{log}: {inputs.machine}: nothing measured in the log (topics '
+                         f'{inputs.machine}/measured/...)')
+    descriptions = inputs.descriptions()
     case = case or _logged_case(log, descriptions, cache_directory)
     if wish.soil_factor is not None:
         case = replace(case, uncertainty=replace(

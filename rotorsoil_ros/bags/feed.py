@@ -1,7 +1,7 @@
 """How does a recorded run reach a monitor? Message by message, ticking at its own full seconds."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 import json
 import math
 from pathlib import Path
@@ -11,19 +11,24 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import (
     ADVICE,
     candidates,
+    in_plants,
     Input,
     inputs as inputs_among,
+    is_called,
     near_misses,
+    place,
     SPEEDS_AT_ONCE,
 )
+from rotorsoil_ros.bags.reader import Source
+from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP, NANOSECONDS
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.wire.cdr import Cursor
-from rotorsoil_ros.wire.definitions import STRING
+from rotorsoil_ros.wire.definitions import JOINT_STATE, STRING
 from rotorsoil_ros.wire.handlers import Inlet, inlet, Outlet
 from rotorsoil_ros.wire.messages import Records
-from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
+from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedSource, USUAL
 
 AT_ONCE = 128  # speeds that may be told before measurements of the same time find them
 
@@ -62,7 +67,8 @@ class Inputs:
 
     @classmethod
     def of(
-        cls, bag: Path, *, machine: str = '', like: str = '', speed: SpeedSource = USUAL,
+        cls, bag: Path, *, machine: str = '', of: Case | None = None,
+        speed: SpeedSource = USUAL,
     ) -> 'Inputs':
         """
         Return the inputs of a machine.
@@ -72,9 +78,9 @@ class Inputs:
         bag : Path
             Bag directory or MCAP file.
         machine : str
-            Its name; empty: the only one.
-        like : str
-            Name to choose where the bag tells of several machines and none is named.
+            Its name, `<plant>/<machine>` or <machine> of one in a plant; empty: the only one.
+        of : Case or None
+            Whose name to choose where the bag tells of several machines and none is named.
         speed : SpeedSource
             What tells its speed.
 
@@ -86,10 +92,15 @@ class Inputs:
         """
         remarks = dict[str, None]()
         sources = bag_reader.sources(bag, tell=remarks.setdefault)
+        found: Mapping[str, Input]
+        plants = in_plants((source.topic for source in sources), machine) or (
+            _as_in_plant(sources, of))
+        like = '' if of is None else of.name
         try:
-            found, missed = inputs_among(sources, speed), near_misses(sources, speed)
+            found, missed = inputs_among(sources, speed, plants), near_misses(sources, speed)
         except InputError as error:
             raise InputError(f'{bag}: {error}') from error
+        found, speed = _of_joint(found, machine or like, of, speed)
         namespace, name = _chosen(bag, found, machine, like, missed, candidates(sources))
         return cls(bag, namespace, name, {
             topic: each for topic, each in found.items()
@@ -154,7 +165,7 @@ def _chosen(
         speaking = {(each.place.namespace, each.place.machine) for each in found.values()
                     if not each.tells_speed and each.number} or {('', machine or like)}
     wanted = machine or (like if len(speaking) > 1 else '')
-    chosen = {each for each in speaking if wanted in ('', each[1])}
+    chosen = {each for each in speaking if not wanted or is_called(each[1], wanted)}
     if len(chosen) == 1:
         return chosen.pop()
     speeds = ', '.join([*(topic for topic, each in found.items() if each.tells_speed),
@@ -163,6 +174,37 @@ def _chosen(
     raise InputError(f'{bag}: must tell the speed of {needed} on joint_states or '
                      f'rotor/speed; speed topics: {speeds}{others}'
                      + (ADVICE if missed or others else ''))
+
+
+def _as_in_plant(sources: Iterable[Source], case: Case | None) -> frozenset[str]:
+    """Return how a machine of a plant is called, where nobody has answered it yet."""
+    if case is None or case.berth is None:
+        return frozenset()
+    paths = [source.topic.split('/')[1:] for source in sources if place(source.topic, source.type)]
+    return frozenset(f'{path[at]}/{case.name}' for path in paths
+                     for at in range(len(path) - 1) if path[at + 1] == case.name)
+
+
+def _of_joint(
+    found: Mapping[str, Input], wanted: str, of: Case | None, speed: SpeedSource,
+) -> tuple[Mapping[str, Input], SpeedSource]:
+    """
+    Return the inputs and what tells the speed, where a message tells it for a whole plant.
+
+    That holds where nothing else tells it: the joint is called as the machine, unless it is said.
+    """
+    plant, _, name = wanted.rpartition('/')
+    speaking = {topic: each for topic, each in found.items() if each.tells_speed and each.number}
+    shared = [(topic, each) for topic, each in speaking.items()
+              if each.source.type == JOINT_STATE and plant in ('', each.place.machine)]
+    is_one_of_many = plant or (of is not None and of.berth is not None)
+    if not is_one_of_many or len(shared) != 1 or any(
+            is_called(each.place.machine, wanted) for each in speaking.values()):
+        return found, speed
+    [(topic, told)] = shared
+    own = replace(told.place, machine=f'{told.place.machine}/{name}')
+    return {**found, topic: replace(told, place=own)}, (
+        speed if speed.joint != ROTOR_JOINT else replace(speed, joint=name))
 
 
 def _is_nobodys(each: Input) -> bool:

@@ -176,7 +176,7 @@ def predict(
         If a file cannot be read or tells no speed, or if `out` is the profile itself.
 
     """
-    inputs = Inputs.of(profile, like=machine.case.name, speed=speed)
+    inputs = Inputs.of(profile, of=machine.case, speed=speed)
     if out is not None and out.exists() and any(out.samefile(file) for file in files(profile)):
         raise InputError(f'{out}: is the profile itself')
     name, unbalance = inputs.machine or machine.case.name, machine.case.unbalance

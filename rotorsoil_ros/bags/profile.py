@@ -1,6 +1,6 @@
 """What did the speed of a machine do? Profiles in bags: found, read, written, measured."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,7 +16,7 @@ from rotorsoil_ros.events import Profile
 from rotorsoil_ros.wire.cdr import ARRAYS
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import OIL_TOPIC, raw_channel, SPEED_TOPICS, TOPICS
-from rotorsoil_ros.wire.messages import JointStateWriter, OWN_TOPICS, Records
+from rotorsoil_ros.wire.messages import JointStateWriter, NODE_NAME, OWN_TOPICS, Records
 from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USUAL
 
 SPEEDS_AT_ONCE = 1024
@@ -29,7 +29,7 @@ CONVERT = {'ros1': ': give the .bag of ROS 1 that it was made of, or convert tha
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where an input stands in the graph: namespace (`` or `/plant`), machine, name below it."""
+    """Where an input stands in the graph: namespace (`` or `/hall`), machine, name below it."""
 
     namespace: str
     machine: str
@@ -64,12 +64,42 @@ class SpeedBatch:
     speed: FloatArray
 
 
-def place(topic: str, message_type: str) -> Place | None:
+def place(topic: str, message_type: str, plants: Collection[str] = ()) -> Place | None:
     """Return where an input of a machine stands; None for every other topic."""
     for name in _names(topic):
         if message_type == TOPICS.get(name, IMU):
-            return _below(topic, name)
+            return _below(topic, name, plants)
     return None
+
+
+def in_plants(topics: Iterable[str], machine: str = '') -> frozenset[str]:
+    """
+    Return which machines are called `<plant>/<machine>`, as one is asked for or a node tells.
+
+    What is heard of such a machine may as well be of one called `<machine>` in the namespace of
+    a hall. What a node answers stands below its own name, which is between the two.
+    """
+    topics = frozenset(topics)
+    heard = {tuple(topic.removesuffix(f'/{name}').split('/'))
+             for topic in topics for name in _names(topic)}
+    found = {machine}
+    for path in [topic.split('/')[:-1] for topic in topics if topic.endswith('/model')]:
+        between = range(1, len(path) - 1)
+        ours = [at for at in between if path[at] == NODE_NAME] or [
+            at for at in between if (*path[:at], *path[at + 1:]) in heard]
+        found.add('/'.join(path[ours[0] + 1:]) if ours else '')
+    return frozenset(name for name in found if '/' in name)
+
+
+def is_called(machine: str, name: str) -> bool:
+    """Return whether a name means a machine; of one in a plant its own is enough."""
+    return name in (machine, machine.rpartition('/')[2])
+
+
+def answered(topic: str, plants: Collection[str]) -> tuple[str, str]:
+    """Return which machine a topic answers for, and which of OWN_TOPICS it is, or nothing."""
+    name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len, default='')
+    return (_below(topic, name, plants).machine, name) if name else ('', '')
 
 
 def _names(topic: str) -> Iterator[str]:
@@ -79,9 +109,10 @@ def _names(topic: str) -> Iterator[str]:
         yield last
 
 
-def _below(topic: str, name: str) -> Place:
-    namespace, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
-    return Place(namespace, machine, name)
+def _below(topic: str, name: str, plants: Collection[str] = ()) -> Place:
+    path = topic.removesuffix(f'/{name}')
+    machine = next((one for one in plants if path.endswith(f'/{one}')), path.rpartition('/')[2])
+    return Place(path.removesuffix(machine).removesuffix('/'), machine, name)
 
 
 def near_misses(sources: Iterable[Source], speed: SpeedSource = USUAL) -> list[str]:
@@ -104,7 +135,7 @@ def near_misses(sources: Iterable[Source], speed: SpeedSource = USUAL) -> list[s
 
 
 def inputs(
-    sources: Mapping[Source, int], speed: SpeedSource = USUAL,
+    sources: Mapping[Source, int], speed: SpeedSource = USUAL, plants: Collection[str] = (),
 ) -> dict[str, Input]:
     """
     Return every topic that is an input of a machine.
@@ -115,6 +146,8 @@ def inputs(
         Channels of a bag, and how many messages each has.
     speed : SpeedSource
         What tells speeds.
+    plants : collection of str
+        Machines that are called `<plant>/<machine>`.
 
     Raises
     ------
@@ -123,19 +156,19 @@ def inputs(
 
     """
     found = {source.topic: Input(where, source, number) for source, number in sources.items()
-             if source.encoding == CDR and (where := place(source.topic, source.type))}
+             if source.encoding == CDR and (where := place(source.topic, source.type, plants))}
     measured = {topic: each for topic, each in found.items() if not each.tells_speed}
     if speed.topic:
         chosen = _named(sources, speed)
         name = next((name for name in _names(chosen.topic) if name in SPEED_TOPICS), '')
-        where = _below(chosen.topic, name) if name else Place('', '', 'rotor/speed')
+        where = _below(chosen.topic, name, plants) if name else Place('', '', 'rotor/speed')
         return {**measured, chosen.topic: Input(where, chosen, sources[chosen])}
     if speed.is_usual:
         return found
     usual = {topic: each for topic, each in found.items() if each.tells_speed
              and not speed.fits(each.source.type, each.source.definition)}
     return {**measured, **(usual or {
-        source.topic: Input(_below(source.topic, name), source, number)
+        source.topic: Input(_below(source.topic, name, plants), source, number)
         for source, number in sources.items() for name in _names(source.topic)
         if name in SPEED_TOPICS and source.encoding == CDR
         and not speed.fits(source.type, source.definition)})}
@@ -218,14 +251,16 @@ def read_profile(
 
     """
     found: dict[str, list[SpeedBatch]] = {}
+    plants = in_plants((source.topic for source in bag_reader.sources(Path(path))), machine or '')
     for batch in speed_profile(Path(path), speed):
         name = next(_names(batch.topic), '')
-        found.setdefault(_below(batch.topic, name).machine if name else machine or '',
+        found.setdefault(_below(batch.topic, name, plants).machine if name else machine or '',
                          []).append(batch)
-    wanted = next(iter(found), '') if machine is None and len(found) == 1 else machine
-    if wanted is None or wanted not in found:
+    chosen = [each for each in found if machine is None or is_called(each, machine)]
+    if len(chosen) != 1:
         raise InputError(f'{path}: machine must be one of {", ".join(found) or "none: no speed"}'
                          + (f', got {machine}' if machine else ''))
+    [wanted] = chosen
     return Profile(wanted, np.concatenate([batch.stamp_ns for batch in found[wanted]]),
                    np.concatenate([batch.speed for batch in found[wanted]]))
 

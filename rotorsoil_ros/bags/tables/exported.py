@@ -1,7 +1,7 @@
 """How does a log become a table? One row for each channel and stamp, units in the columns."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 import json
 import math
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotorsoil_ros.bags import reader as bag_reader
-from rotorsoil_ros.bags.profile import place
+from rotorsoil_ros.bags.profile import answered, in_plants, is_called, place
 from rotorsoil_ros.bags.tables.files import opened, require_suffix, Value
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
@@ -20,7 +20,7 @@ from rotorsoil_ros.units import in_plant_units, plant_column
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, STRING
 from rotorsoil_ros.wire.handlers import SPEED_TOPICS
-from rotorsoil_ros.wire.messages import OWN_TOPICS, Records
+from rotorsoil_ros.wire.messages import Records
 from rotorsoil_ros.wire.sensors import JointStateReader
 from rotorsoil_ros.wire.speeds import SpeedReader, USUAL
 
@@ -80,10 +80,11 @@ def export_log(
     log, out = Path(log), Path(out)
     require_suffix(out)
     sources = bag_reader.sources(log)
+    plants = in_plants((source.topic for source in sources), machine)
     wanted = {source.topic: found for source in sources
               if source.encoding == bag_reader.CDR
-              and (found := _told(source.topic, source.type))
-              and machine in ('', found[0])}
+              and (found := _told(source.topic, source.type, plants))
+              and (not machine or is_called(found[0], machine))}
     if not any(kind for _, kind in wanted.values()):
         raise InputError(f'{log}: tells nothing of {machine or "any machine"} that was predicted '
                          'or measured')
@@ -113,16 +114,15 @@ def export_log(
     return count
 
 
-def _told(topic: str, message_type: str) -> tuple[str, str] | None:
+def _told(topic: str, message_type: str, plants: Collection[str]) -> tuple[str, str] | None:
     """Return of which machine a topic tells, and what: nothing for its speed."""
-    if (found := place(topic, message_type)) is not None:
+    if (found := place(topic, message_type, plants)) is not None:
         if found.name in SPEED_TOPICS:
             return found.machine, ''
         return (found.machine, TOLD_BY[found.name]) if found.name in TOLD_BY else None
     if message_type != JOINT_STATE:
         return None
-    name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len, default='')
-    machine = topic.removesuffix(f'/{name}').rpartition('/')[2]
+    machine, name = answered(topic, plants)
     return (machine, TOLD_BY[name]) if name in TOLD_BY else None
 
 
@@ -220,7 +220,7 @@ class _Tables:
                 self._take_zones(payload)
         elif batch.type == STRING:
             for payload in batch.payloads:
-                self._take_model(batch.topic, payload)
+                self._take_model(payload)
         else:
             name, quantity = self._wanted[batch.topic]
             if quantity:
@@ -247,14 +247,14 @@ class _Tables:
         found = reader.read(batch.log_time_ns, batch.payloads)
         machine.turn(found.stamps, found.speed)
 
-    def _take_model(self, topic: str, payload: bytes) -> None:
+    def _take_model(self, payload: bytes) -> None:
         """Keep at which speeds a machine is unstable, as the node tells of it."""
         try:
             told = json.loads(Layout.of(STRING, payload).texts['data'][0])
             ranges = [(float(low), float(high)) for low, high in told[UNSTABLE_RANGES]]
+            name = str(told['machine'])
         except (InputError, ValueError, KeyError, TypeError):
             return
-        name = topic.removesuffix('/model').rpartition('/')[2]
         if name in self._machines:
             self._machines[name].unstable = ranges
 
