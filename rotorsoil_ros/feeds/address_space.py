@@ -43,15 +43,16 @@ _NUMBER, _RANGED = (ua.NodeId(kind) for kind in (
 
 class AddressSpace:
     """
-    Objects of a server: `RotorSoil`, machines below it, channels below these.
+    Objects of a server: `RotorSoil`, plants and machines below it, channels below these.
 
     Nodes are called by their path, `fan/drive_end_housing_x/Amplitude`, and keep that name as
-    long as case and machine keep theirs.
+    long as case and machine keep theirs. A machine of a plant stands below it: `house/fan/...`.
     """
 
     def __init__(self, server: 'Server', index: int) -> None:
         self._server, self._index = server, index
         self._known: dict[str, dict[tuple[str, str], ua.NodeId]] = {}
+        self._plants: set[str] = set()
 
     async def open(self) -> None:
         """Make the place where machines will stand."""
@@ -63,7 +64,12 @@ class AddressSpace:
         known = self._known.get(machine.name)
         if known is None:
             known = self._known[machine.name] = {}
-            await self._add([self._object(self._id(ROOT), machine.name, machine.name,
+            plant, _, name = machine.name.rpartition('/')
+            if plant and plant not in self._plants:
+                self._plants.add(plant)
+                await self._add([self._object(self._id(ROOT), plant, plant, plant,
+                                              kind=_FOLDER, by=_ORGANIZES)])
+            await self._add([self._object(self._id(plant or ROOT), machine.name, name,
                                           machine.name, kind=_OBJECT, by=_ORGANIZES)])
         gone = [key for key in known if key not in machine.points]
         fresh = [point for key, point in machine.points.items() if key not in known]

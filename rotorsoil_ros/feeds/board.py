@@ -218,7 +218,7 @@ class Board:
     def __init__(self, inbox: Inbox, *, plant: bool = True) -> None:
         self.machines: dict[str, MachineBoard] = {}
         self._inbox, self._plant = inbox, plant
-        self._by_status: dict[str, MachineBoard] = {}
+        self._by_path: dict[str, MachineBoard] = {}
         self._vectors = VectorReader()
 
     def refresh(self, now_ns: int) -> list[MachineBoard]:
@@ -254,20 +254,19 @@ class Board:
             self._machine(place, now_ns).take_vector(name, stamp_ns, channels, fields)
 
     def _take_report(self, report: Report, now_ns: int) -> None:
-        if (machine := self._by_status.get(report.name)) is not None:
+        if (machine := self._by_path.get(report.of)) is not None:
             machine.hear(now_ns)
-            machine.take_report(report)
-        elif (machine := self._by_status.get(
-                report.name.removesuffix(f' {VIBRATION}'))) is not None:
-            machine.hear(now_ns)
-            machine.take_vibration(report)
+            if report.name.endswith(f' {VIBRATION}'):
+                machine.take_vibration(report)
+            else:
+                machine.take_report(report)
 
     def _machine(self, place: Speaker, now_ns: int) -> MachineBoard:
-        machine = self._by_status.get(place.status)
+        machine = self._by_path.get(place.path)
         if machine is None:
             machine = MachineBoard(place.name, plant=self._plant)
             if len(self.machines) < MOST_MACHINES:
-                self.machines[place.name] = self._by_status[place.status] = machine
+                self.machines[place.name] = self._by_path[place.path] = machine
         machine.hear(now_ns)
         return machine
 

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.monitor.verdict import VIBRATION
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, STRING
 from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, NODE_NAME, OWN_TOPICS
@@ -28,7 +29,12 @@ MOST_TOPICS = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Speaker:
-    """Who speaks: a machine, and the node that answers for it."""
+    """
+    Who speaks: a machine, and the node that answers for it.
+
+    Of `watcher/house/fan` nobody can tell whether `house` is a plant or the node is called
+    `watcher/house`; where it matters the node has its usual name.
+    """
 
     node: str
     machine: str
@@ -39,20 +45,21 @@ class Speaker:
         # Of `steady/amplitude` and `amplitude` the longer name is meant.
         name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len,
                    default='')
-        node, _, machine = topic.removesuffix(f'/{name}').rpartition('/')
-        is_heard = name in HEARD and node and machine
-        return (cls(node.strip('/'), machine), name) if is_heard else None
+        path = topic.removesuffix(f'/{name}').strip('/').split('/')
+        node = path.index(NODE_NAME) + 1 if NODE_NAME in path[:-1] else len(path) - 1
+        is_heard = name in HEARD and node > 0 and path[-1]
+        return (cls('/'.join(path[:node]), '/'.join(path[node:])), name) if is_heard else None
 
     @property
     def name(self) -> str:
-        """How feeds call it: `fan`, `hall_2.fan`, of a node with another name `watcher.fan`."""
+        """How feeds call it: `fan`, `hall_2.fan`, `house/fan` in a plant, or `watcher.fan`."""
         parts = [part for part in self.node.split('/') if part and part != NODE_NAME]
         return '.'.join([*parts, self.machine])
 
     @property
-    def status(self) -> str:
-        """How diagnostics call it."""
-        return f'{self.node}: {self.machine}'
+    def path(self) -> str:
+        """Where its topics are."""
+        return f'{self.node}/{self.machine}'
 
 
 def places_in(topics: Mapping[str, str]) -> list[Speaker]:
@@ -110,6 +117,11 @@ class Report:
     level: int
     summary: str
     values: Mapping[str, str]
+
+    @property
+    def of(self) -> str:
+        """Where the topics are of whom it tells, whichever part of that is the node's name."""
+        return self.name.removesuffix(f' {VIBRATION}').replace(': ', '/', 1)
 
     def number(self, key: str) -> float:
         """Return a value as a number; NaN where it is none."""

@@ -119,7 +119,9 @@ class EdgeNode:
         return number
 
     def _topic(self, kind: str, *device: str) -> str:
-        return '/'.join((NAMESPACE_B, self.group, kind, self.node, *device))
+        # What a name of Sparkplug must not hold stands between a plant and its machine.
+        return '/'.join((NAMESPACE_B, self.group, kind, self.node,
+                         *(name.replace('/', ':') for name in device)))
 
 
 def asks_for_rebirth(payload: bytes) -> bool:

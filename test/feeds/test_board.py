@@ -33,11 +33,13 @@ def qualities(machine, names, channel=X):
     ('/hall_2/rotorsoil/fan/phase', 'hall_2/rotorsoil', 'fan', 'phase', 'hall_2.fan'),
     ('/hall_2/line/rotorsoil/fan/model', 'hall_2/line/rotorsoil', 'fan', 'model',
      'hall_2.line.fan'),
-    ('/watcher/fan/residual', 'watcher', 'fan', 'residual', 'watcher.fan')])
+    ('/watcher/fan/residual', 'watcher', 'fan', 'residual', 'watcher.fan'),
+    ('/hall_2/rotorsoil/house/fan/phase', 'hall_2/rotorsoil', 'house/fan', 'phase',
+     'hall_2.house/fan')])
 def test_a_topic_tells_who_speaks(topic, node, machine, told, name):
     place, what = Speaker.of(topic)
     assert (place.node, place.machine, what, place.name) == (node, machine, told, name)
-    assert place.status == f'{node}: {machine}'
+    assert topic == f'/{place.path}/{told}'
 
 
 @pytest.mark.parametrize('topic', [
@@ -218,16 +220,19 @@ def test_a_case_that_is_reloaded_changes_the_channels(plant):
     assert {point.channel for point in plant.board.settle()} == {'pump_housing_z'}
 
 
-def test_two_halls_with_a_fan_each_are_told_apart(machine):
-    one = Plant(machine, namespace='/hall_1')
-    two = Plant(machine, namespace='/hall_2', inbox=one.inbox)
+@pytest.mark.parametrize('first, second, names', [
+    (('/hall_1', 'fan'), ('/hall_2', 'fan'), ('hall_1.fan', 'hall_2.fan')),
+    (('', 'house_1/fan'), ('', 'house_2/fan'), ('house_1/fan', 'house_2/fan'))])
+def test_two_halls_or_plants_with_a_fan_each_are_told_apart(machine, first, second, names):
+    one = Plant(machine, namespace=first[0], name=first[1])
+    two = Plant(machine, namespace=second[0], name=second[1], inbox=one.inbox)
     one.turns(1.0, RUNNING)
     one.ticks(1.5)
     for second in range(1, 6):
         two.ticks(second)
     one.board.refresh(SECOND)
     states = {name: seen.points['', 'State'].value for name, seen in one.board.machines.items()}
-    assert states == {'hall_1.fan': 'OK', 'hall_2.fan': 'STALE'}
+    assert states == dict(zip(names, ('OK', 'STALE'), strict=True))
 
 
 @pytest.mark.parametrize('topic', ['/rotorsoil/fan/amplitude', '/rotorsoil/fan/model',

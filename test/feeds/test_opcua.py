@@ -149,6 +149,19 @@ def test_a_machine_that_comes_later_is_there_and_one_with_another_case_is_anothe
     asyncio.run(look())
 
 
+def test_machine_of_a_plant_stands_below_it(plant, machine, address):
+    async def look():
+        async with client(address) as reader:
+            fan = Plant(machine, name='house/fan', inbox=plant.inbox)
+            fan.turns(1.0, RUNNING)
+            await wait_for(reader, f'house/fan/{X}/Amplitude', has(Quality.GOOD))
+            index = await reader.get_namespace_index(NAMESPACE)
+            browsed = await reader.nodes.objects.get_child(
+                [f'{index}:{name}' for name in ('RotorSoil', 'house', 'fan', X, 'Amplitude')])
+            assert browsed.nodeid == ua.NodeId(f'house/fan/{X}/Amplitude', index)
+    asyncio.run(look())
+
+
 def test_who_subscribes_is_told_what_changes(plant, address):
     class Told(list):
         def datachange_notification(self, node, value, data):

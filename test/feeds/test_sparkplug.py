@@ -43,6 +43,11 @@ def test_bytes_are_those_of_another_implementation():
     assert got.payload == PAYLOAD
 
 
+def test_machine_of_a_plant_is_a_device_whose_name_a_topic_can_have():
+    edge = EdgeNode('site', 'hall')
+    assert edge.device_death('house/fan', NOW_MS).topic == 'spBv1.0/site/DDEATH/hall/house:fan'
+
+
 def test_births_and_deaths_of_a_node_carry_the_number_of_the_connection():
     edge = EdgeNode('plant', 'hall', bd_seq=255)
     for number in (255, 0, 1):

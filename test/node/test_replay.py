@@ -26,7 +26,7 @@ from rotorsoil_ros.wire.messages import JointStateWriter, Records
 from rotorsoil_ros.wire.sensors import JointStateReader
 from rotorsoil_ros.wire.speeds import SpeedSource
 
-from records import topics_of
+from records import joint_records, topics_of
 
 FAN = Path('config/plant_fan.yaml')
 RPM = Path(__file__).parents[1] / 'cases' / 'speed_in_another_type' / 'rpm_int32.mcap'
@@ -175,6 +175,17 @@ def test_replay_brings_its_own_context_and_gives_up_when_nobody_listens(
     monkeypatch.setenv('ROS_DOMAIN_ID', '59')
     with pytest.raises(RotorSoilError, match=r'nobody listens to /fan/joint_states after 0\.1 s'):
         replay(profile, wait_s=0.1)
+
+
+def test_who_is_not_heard_is_told_and_the_others_are_replayed(graph, tmp_path, capfd):
+    profile = tmp_path / 'profile.mcap'
+    with LogFile(profile) as log:
+        for topic in ('/fan/joint_states', '/geared/joint_states'):
+            log.write(joint_records(3, topic=topic))
+    heard = graph.hear('/fan/joint_states', JointState)
+    assert replay(profile, rate=1e6, wait_s=2.0, context=graph.context) == 6
+    graph.until(lambda: len(heard) == 3, 'all speeds of the fan')
+    assert 'nobody listens to /geared/joint_states after 2 s' in capfd.readouterr().err
 
 
 def test_replay_ends_with_its_context(graph, profile):
