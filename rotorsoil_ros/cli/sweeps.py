@@ -8,6 +8,7 @@ import sys
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.case.flexible.words import beyond_modes
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import Plant, sources_of
 from rotorsoil_ros.case.summary import unstable
@@ -80,8 +81,17 @@ def seats(arguments: Namespace) -> int:
 
     header = ['frequency_hz' if plant else 'omega_rad_s', *complex_names(
         f'{response}__{force}' for response in names for force in names)]
-    write_sweep(arguments.output, header, hz_to_rad_s(values(arguments.hz)), rows)
+    omega = hz_to_rad_s(values(arguments.hz))
+    write_sweep(arguments.output, header, omega, rows)
+    _doubted(next(iter(standing.machines.values())) if isinstance(standing, Plant) else standing,
+             omega)
     return 0
+
+
+def _doubted(machine: Machine, omega: FloatArray) -> None:
+    """Say which foundations are known too little for the highest frequency."""
+    for text in beyond_modes(machine.case, float(omega.max())):
+        print(f'{machine.case.path}: {text}', file=sys.stderr)
 
 
 def _contact(
@@ -130,6 +140,7 @@ def response(arguments: Namespace) -> int:
         return machine.order_response(order=order, force=channel, rpm=part)
 
     write_responses(arguments, machine.model.channels, speed, solve, per_force=False)
+    _doubted(machine, (order or 1.0) * rpm_to_rad_s(speed))
     return _told(machine, rpm_to_rad_s(speed), float(speed.max()))
 
 
@@ -183,6 +194,7 @@ def frf(arguments: Namespace) -> int:
 
     write_responses(arguments, machine.model.channels, values(arguments.hz), solve,
                     per_force=True)
+    _doubted(machine, hz_to_rad_s(values(arguments.hz)))
     return _told(machine, rpm_to_rad_s(np.array([arguments.rpm])), arguments.rpm)
 
 
@@ -202,6 +214,7 @@ def transmissibility(arguments: Namespace) -> int:
             found.ratio.reshape(len(part), -1))], axis=1)
 
     write_sweep(arguments.output, header, values(arguments.hz), rows)
+    _doubted(machine, hz_to_rad_s(values(arguments.hz)))
     return _told(machine, rpm_to_rad_s(np.array([arguments.rpm])), arguments.rpm)
 
 

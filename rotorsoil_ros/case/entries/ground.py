@@ -10,6 +10,7 @@ from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, HIGHEST_ORDER
 from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.ground.embedded_cone import require_whole_wall
+from rotorsoil_ros.ground.green import LEAST_LOSS
 from rotorsoil_ros.ground.half_space import a0_range
 from rotorsoil_ros.ground.layers.model import Proportions
 from rotorsoil_ros.ground.layers.profile import (
@@ -169,6 +170,11 @@ class GroundEntries:
                 raise self.faults.error('foundations', index, 'soil_under', problem=(
                     'must be winkler or each where the ground is no homogeneous half-space, got '
                     f'green with the support model {model}'))
+            if block.soil_under == 'green' and isinstance(entries.soil, schema.SoilEntry) and (
+                    entries.soil.loss_factor < LEAST_LOSS):
+                raise self.faults.error('soil', 'loss_factor', problem=(
+                    f'must be >= {LEAST_LOSS:g} where patches are coupled through the ground '
+                    f'(foundations.{index}), got {entries.soil.loss_factor:g}'))
             if (block.soil_under == 'green' and entries.uncertainty is not None
                     and entries.uncertainty.rock_depth is not None):
                 raise self.faults.error('uncertainty', 'rock_depth', problem=(

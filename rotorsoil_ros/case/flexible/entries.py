@@ -17,13 +17,16 @@ from rotorsoil_ros.case.flexible.files import Loss, of_matrices, of_modes
 from rotorsoil_ros.channel import ACROSS, DOFS
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
-from rotorsoil_ros.machine.flexible.body import CONTACT, EACH, FlexibleBody, PROBE
+from rotorsoil_ros.machine.flexible.body import CONTACT, EACH, FlexibleBody, GREEN, PROBE
 from rotorsoil_ros.machine.flexible.rigidity import ABOVE_EXCITATION
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import rad_s_to_hz
 
 # Modes have to reach so many times the highest 1X frequency.
-LEAST_REACH, GOOD_REACH = 2.0, 3.0
+LEAST_REACH = 2.0
+
+# To be raised whenever other bodies come out of the same files, or other files are refused.
+_ALGORITHM = 2
 
 # A seat belongs onto the shaft [m].
 _OFF_SHAFT = 0.02
@@ -85,14 +88,15 @@ class FlexibleEntries:
         by_modes = self._by_modes(index, entry)
         highest = entry.keep_up_to * self.speed
         asked = [highest, entry.model_dump()]
-        told = f'flexible {name}'
+        # Machines of other speeds on the same foundation ask for other modes.
+        told = f'flexible {name} {highest:.9g}'
         if told in self.files:
             stored = json.loads(self.files[told])
             if stored['asked'] == json.loads(json.dumps(asked)):
                 return FlexibleBody.from_plain(stored['body'])
         paths = [self._path(getattr(entry, key)) for key in (_MODES if by_modes else _MATRICES)
                  + ('dofs',) * by_modes if getattr(entry, key) is not None]
-        key = content_key('flexible', asked, [_digest(path) for path in paths])
+        key = content_key('flexible', _ALGORITHM, asked, [_digest(path) for path in paths])
         kept = self.cache.load('flexible', key)
         if kept is not None:
             plain: dict[str, Any] = json.loads(str(kept['body']))
@@ -113,6 +117,11 @@ class FlexibleEntries:
                 'needs either stiffness, mass and dofs, or modes, residual and rigid, got '
                 f'{"both" if both else "neither"}'))
         needed = _MODES if both == ['modes'] else _MATRICES
+        unused = next((key for key in (*_MODES, *_MATRICES[:2]) if key not in needed
+                       and getattr(entry, key) is not None), None)
+        if unused is not None:
+            raise self.faults.error(*place, unused, problem=(
+                f'belongs to {"stiffness" if both == ["modes"] else "modes"}, got {both[0]}'))
         for key in needed:
             if getattr(entry, key) is None:
                 raise self.faults.error(*place, key, problem='is missing' + (
@@ -178,6 +187,13 @@ class FlexibleEntries:
         if under is None and model != 'rigid':
             raise self.faults.error(*place, 'soil_under', problem=(
                 f'is missing: winkler, green or each, below {len(body.patches)} contacts'))
+        outlined = entry.radius is not None or entry.half_width is not None
+        if (not body.patches[0].area and model not in ('rigid', 'table')
+                and (under == GREEN or (under == EACH and not outlined))):
+            raise self.faults.error(*place, 'flexible', 'dofs', problem=(
+                f'must say the area [m^2] of every contact below which soil_under is {under}'
+                + ('' if under == GREEN else ', or the foundation its half_width and half_length')
+            ))
         return self._patched(body, under or EACH)
 
     def _patched(self, body: FlexibleBody, under: str) -> FlexibleBody:
@@ -204,11 +220,11 @@ class FlexibleEntries:
     def _refuse_few_modes(
         self, index: int, entry: schema.FlexibleEntry, body: FlexibleBody,
     ) -> None:
-        if entry.modes is not None and body.highest < LEAST_REACH * self.speed:
+        if entry.modes is not None and body.reach < LEAST_REACH * self.speed:
             raise self.faults.error('foundations', index, 'flexible', 'modes', problem=(
                 f'must reach {LEAST_REACH:g} times the highest 1X frequency, '
                 f'{rad_s_to_hz(LEAST_REACH * self.speed):.4g} Hz, '
-                f'got {rad_s_to_hz(body.highest):.4g} Hz'))
+                f'got {rad_s_to_hz(body.reach):.4g} Hz'))
 
     def _centre(
         self, index: int, entry: schema.FoundationEntry, body: FlexibleBody,

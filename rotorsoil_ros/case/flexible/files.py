@@ -12,8 +12,9 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.flexible import matrices, tables, universal
 from rotorsoil_ros.case.flexible.foreign import reading, text_of
 from rotorsoil_ros.case.flexible.interface import Interface
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import RotorSoilError
-from rotorsoil_ros.machine.flexible.body import FlexibleBody
+from rotorsoil_ros.machine.flexible.body import FlexibleBody, massless, SEAT
 from rotorsoil_ros.machine.flexible.reduction import FiniteElements
 from rotorsoil_ros.units import hz_to_rad_s
 
@@ -46,8 +47,11 @@ class Loss:
                 raise RotorSoilError(f'damping_ratios must be one number or {count}, one for each '
                                      f'mode, got {len(ratios)}')
             loss = 2.0 * np.broadcast_to(ratios, count)
-        if not (np.all(loss >= 0.0) and np.all(loss < 1.0)):
-            raise RotorSoilError(f'loss_factor must be in [0, 1), got {loss.max():g}')
+        wrong = loss[~((loss >= 0.0) & (loss < 1.0))]
+        if wrong.size:
+            raise RotorSoilError(
+                f'loss_factor must be in [0, 1), got {wrong[0]:g}' if self.ratios is None else
+                f'damping_ratios must be in [0, 0.5), got {0.5 * wrong[0]:g}')
         return loss.copy(), float(loss.mean()) if count else 0.0
 
 
@@ -107,8 +111,14 @@ def of_modes(
     own = (tables.dofs_of(modes, names, rigid_rows) if dofs is None
            else tables.dofs_among(dofs, rows, names, rigid_rows))
     each, rest = loss.of(len(frequency))
-    return FlexibleBody(tuple(own), mass, rigid_rows, shapes, hz_to_rad_s(frequency) ** 2,
-                        flexibility, each, rest)
+    if not flexibility.any() and len(frequency) < len(names) - len(DOFS):
+        raise RotorSoilError(f'residual must not be zero where {len(frequency)} modes tell of '
+                             f'{len(names)} motions: they leave something out')
+    body = FlexibleBody(tuple(own), mass, rigid_rows, shapes, hz_to_rad_s(frequency) ** 2,
+                        flexibility, each, rest, reach=float(hz_to_rad_s(frequency.max())))
+    loaded = [*body.of_kind(SEAT), *body.contacts.tolist()]
+    massless(body.residual[np.ix_(loaded, loaded)], body.static_size[loaded])
+    return body
 
 
 def of_matrices(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+import math
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,9 @@ from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof
 from rotorsoil_ros.machine.flexible.reduction import Sparse
+
+# Places nearer than this are one [m].
+_SAME_PLACE = 1e-3
 
 # Nodes whose smallest principal extent is below this share of the largest lie on a line.
 _ON_A_LINE = 1e-6
@@ -30,14 +34,14 @@ class Interface:
         The motions.
     pick : (p, d) sparse matrix
         Each of them by the motions of the matrices.
-    known : tuple of (int, Dof)
+    known : mapping of int to Dof
         Motions of the matrices whose place is known.
 
     """
 
     dofs: tuple[Dof, ...]
     pick: Sparse
-    known: tuple[tuple[int, Dof], ...]
+    known: Mapping[int, Dof]
 
     @classmethod
     def of(
@@ -64,7 +68,7 @@ class Interface:
             With the line that asks for what is not there.
 
         """
-        found = _Found(path, size, order, [], [], [])
+        found = _Found(path, size, order, [], [], {})
         places: dict[str, list[Row]] = {}
         for row in rows:
             if row.is_node:
@@ -74,7 +78,7 @@ class Interface:
         if not found.dofs:
             raise InputError(f'{path}: names no seat and no contact')
         pick = scipy.sparse.csc_matrix(np.stack(found.picks))
-        return cls(tuple(found.dofs), pick, tuple(found.known))
+        return cls(tuple(found.dofs), pick, found.known)
 
 
 @dataclass
@@ -86,7 +90,7 @@ class _Found:
     order: Mapping[tuple[int, int], int] | None
     dofs: list[Dof]
     picks: list[FloatArray]
-    known: list[tuple[int, Dof]]
+    known: dict[int, Dof]
 
     def _indices(self, row: Row) -> list[int]:
         """Return which motions of the matrices a line means: one, or x, y and z of a node."""
@@ -105,14 +109,25 @@ class _Found:
         else:
             raise InputError(f'{self.path}: line {row.line}: needs index or node')
         if max(found) >= self.size:
-            raise InputError(f'{self.path}: line {row.line}: index must be up to {self.size}, the '
-                             f'size of the matrices, got {max(found) + 1}')
+            raise InputError(
+                f'{self.path}: line {row.line}: index must be up to {self.size - len(axes) + 1}, '
+                f'the matrices have {self.size} motions, got {found[0] + 1}')
+        for index, axis in zip(found, axes, strict=True):
+            self._know(row, index, replace(row.dof, axis=axis))
         return found
+
+    def _know(self, row: Row, index: int, dof: Dof) -> None:
+        """Keep where a motion of the matrices is; whoever asks for it again has to agree."""
+        known = self.known.setdefault(index, dof)
+        if known.axis != dof.axis or math.dist(known.place, dof.place) > _SAME_PLACE:
+            raise InputError(
+                f'{self.path}: line {row.line}: index {index + 1} must be one motion of one '
+                f'place, got {known.axis} of {known.station} at {known.place} and {dof.axis} of '
+                f'{dof.station} at {dof.place}')
 
     def single(self, row: Row) -> None:
         """Add one motion."""
         [index] = self._indices(row)
-        self.known.append((index, row.dof))
         self.dofs.append(row.dof)
         self.picks.append(np.eye(1, self.size, index)[0])
 
@@ -126,8 +141,13 @@ class _Found:
         indices = []
         for row in nodes:
             own = self._indices(row)
-            self.known += [(index, replace(row.dof, axis=axis))
-                           for index, axis in zip(own, DOFS[:3], strict=True)]
+            if own[0] in indices:
+                raise InputError(f'{self.path}: line {row.line}: index {own[0] + 1} stands twice '
+                                 f'in {row.dof.station}')
+            if row.dof.kind != group[0].dof.kind:
+                raise InputError(f'{self.path}: line {row.line}: kind of {row.dof.station} must '
+                                 f'be the same on every line, got {row.dof.kind} and '
+                                 f'{group[0].dof.kind}')
             indices += own
         area = np.array([row.dof.area or 1.0 for row in nodes])
         places = np.array([row.dof.place for row in nodes])

@@ -17,6 +17,8 @@ from rotorsoil_ros.machine.flexible.reduction import Sparse
 
 _MOST_MOTIONS = 200_000
 _MARKET = b'%%MatrixMarket'
+# Kinds of it that are no stiffness and no mass.
+_NOT_REAL = {'complex', 'pattern', 'skew-symmetric', 'hermitian'}
 STIFFNESS, MASS, ORDER = '.sti', '.mas', '.dof'
 # Fortran's exponents as C reads them.
 _EXPONENTS = bytes.maketrans(b'Dd', b'Ee')
@@ -49,6 +51,16 @@ def read(path: Path) -> Sparse:
 
 
 def _of_market(path: Path, content: bytes) -> Sparse:
+    header = content.lstrip().split(b'\n', 1)[0].decode(errors='replace').lower().split()
+    for word in _NOT_REAL & {*header[3:]}:
+        raise InputError(f'{path}: must be real or integer, and general or symmetric, got {word}'
+                         + ('; damping is given by loss_factor' if word == 'complex' else ''))
+    comma = None if b',' not in content else next((
+        number for number, line in enumerate(content.splitlines(), 1)
+        if b',' in line and not line.lstrip().startswith(b'%')), None)
+    if comma is not None:
+        raise InputError(f'{path}: line {comma}: numbers must be separated by blanks, and '
+                         'decimals by points, got a comma')
     try:
         found = scipy.io.mmread(BytesIO(content.lstrip()))
     except (ValueError, OverflowError, MemoryError, EOFError) as error:
@@ -61,8 +73,6 @@ def _checked(path: Path, matrix: Sparse) -> Sparse:
     if rows != columns or not 0 < rows <= _MOST_MOTIONS:
         raise InputError(f'{path}: must be square with up to {_MOST_MOTIONS} motions, got {rows} '
                          f'x {columns}')
-    if np.iscomplexobj(matrix.data):
-        raise InputError(f'{path}: must be real; damping is given by loss_factor')
     if not np.all(np.isfinite(matrix.data)):
         raise InputError(f'{path}: must hold finite numbers only')
     return matrix.astype(float)

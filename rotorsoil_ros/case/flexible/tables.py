@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 import math
 from pathlib import Path
@@ -96,6 +96,10 @@ def lines_of(path: Path, text: str) -> list[tuple[int, list[str]]]:
              if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#')]
     if not found:
         raise InputError(f'{path}: is empty')
+    line, first = found[0]
+    if len(first) == 1 and ';' in first[0]:
+        raise InputError(f'{path}: line {line}: cells must be separated by commas, and decimals '
+                         f'by points, got {shown(first[0])}')
     return found
 
 
@@ -157,7 +161,29 @@ def motions(path: Path, text: str) -> list[Row]:
         return _row(path, line, dict(zip(header, cells, strict=True)))
 
     rows = at_once(partial(row, line, cells) for line, cells in lines)
-    return [one for one in rows if one is not None]
+    return _with_areas(path, [one for one in rows if one is not None])
+
+
+def _with_areas(path: Path, rows: Sequence[Row]) -> list[Row]:
+    """Return the motions of one contact with one area, which may stand at one of them only."""
+    stated: dict[str, float] = {}
+    # Nodes have areas of their own.
+    for row in rows:
+        if not row.is_node and row.dof.area:
+            known = stated.setdefault(row.dof.station, row.dof.area)
+            if row.dof.area != known:
+                raise InputError(
+                    f'{path}: line {row.line}: area of {row.dof.station} must be the same on '
+                    f'every line, got {row.dof.area:g} and {known:g} m^2')
+    found = [row if row.is_node else replace(row, dof=replace(
+        row.dof, area=stated.get(row.dof.station, 0.0))) for row in rows]
+    on_ground = [row for row in found if row.dof.kind == CONTACT
+                 and not (row.is_node and row.index is None and row.node is None)]
+    without = next((row for row in on_ground if not row.dof.area), None)
+    if without is not None and any(row.dof.area for row in on_ground):
+        raise InputError(f'{path}: line {without.line}: area [m^2] is missing, while other '
+                         'contacts have theirs')
+    return found
 
 
 def _row(path: Path, line: int, cells: dict[str, str]) -> Row | None:
@@ -271,6 +297,9 @@ def rigid_of(
     least = float(np.linalg.eigvalsh(mass)[0])
     if not least > 0.0:
         raise InputError(f'{path}: mass must be positive in every direction, got {least:.3g}')
+    if np.abs(mass[:3, :3] - mass[0, 0] * np.eye(3)).max() > _PRINTED * mass[0, 0]:
+        raise InputError(f'{path}: mass must be the same along x, y and z, got '
+                         f'{", ".join(f"{one:g}" for one in mass.diagonal()[:3])} kg')
     return mass, table[len(DOFS):]
 
 
@@ -327,12 +356,20 @@ def dofs_of(path: Path, names: Sequence[str], rows: FloatArray) -> list[Dof]:
         for along, value in enumerate((x, y, z)):
             if value is not None:
                 place[along] = value
-    found = []
-    for station, axis in split:
+
+    def of(station: str, axis: str, moves: FloatArray) -> Dof:
         on_ground = re.sub(r'_?\d*$', '', station) in _ON_GROUND
         x, y, z = places[station]
-        found.append(Dof(station, axis, CONTACT if on_ground else SEAT, (x, y, z)))
-    return found
+        dof = Dof(station, axis, CONTACT if on_ground else SEAT, (x, y, z))
+        # NaN: a place that no motion tells is free to be anywhere.
+        if np.nanmax(np.abs(dof.rigid_row - moves)) > _PRINTED * (1.0 + np.abs(moves).max()):
+            raise InputError(f'{path}: {station}_{axis} must move along {axis} of the file rigid '
+                             'as its place does, whose rows are in this order, got '
+                             f'{", ".join(f"{one:g}" for one in moves)}')
+        return dof
+
+    return at_once(partial(of, station, axis, moves)
+                   for (station, axis), moves in zip(split, rows, strict=True))
 
 
 def _split(path: Path, name: str) -> tuple[str, str]:

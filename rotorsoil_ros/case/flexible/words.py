@@ -5,14 +5,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.flexible.entries import LEAST_REACH
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.machine.flexible.body import FlexibleBody, GROUNDED
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import rad_s_to_hz
 
-# Modes up to so many times the highest 1X frequency leave less than a percent.
+# Modes up to so many times the highest 1X frequency leave about a percent.
 _GOOD_REACH = 3.0
 # Modes that are told, the lowest of all.
 _TOLD = 5
+
+# Shapes of unit modal mass reach about 2 times one over the root of the mass; beyond so much they
+# are of something else.
+_FAR_OFF = 30.0
 
 # How far each way to put ground below patches was off, in displacement of the seats: worst and
 # median of several rafts and soils, against the half-space below 48 patches.
@@ -71,10 +77,35 @@ def of_bodies(case: Case) -> Iterator[str]:
         entry = case.content['foundations'][index].get('flexible') or {}
         if block.body is None:
             continue
-        reach = block.body.highest / case.speed_range[1]
-        few = entry.get('modes') is not None and reach < _GOOD_REACH
-        if few or entry.get('keep_up_to', _GOOD_REACH) < _GOOD_REACH:
-            kept = min(reach, entry.get('keep_up_to', _GOOD_REACH))
-            yield (f'foundations.{index}: {block.name} is known by modes up to {kept:.3g} times '
-                   f'the highest 1X frequency; {_GOOD_REACH:g} times leave less than 1%, 2 times '
+        if entry.get('modes') is not None:
+            yield from _odd_shapes(index, block.body)
+        reach = block.body.reach / case.speed_range[1]
+        if reach < _GOOD_REACH:
+            yield (f'foundations.{index}: {block.name} is known by modes up to {reach:.3g} times '
+                   f'the highest 1X frequency; {_GOOD_REACH:g} times leave about 1%, 2 times '
                    'up to 2.5%')
+
+
+def beyond_modes(case: Case, omega: float) -> Iterator[str]:
+    """Yield which foundations that bend are known by too few modes for a frequency [rad/s]."""
+    for index, block in enumerate(case.foundations):
+        if block.body is not None and omega * LEAST_REACH > block.body.reach:
+            reach = float(rad_s_to_hz(block.body.reach))
+            way = (', keep_up_to brings more' if 'stiffness' in case.content['foundations'][index][
+                'flexible'] else '')
+            yield (f'foundations.{index}.flexible: {block.name} is known by modes up to '
+                   f'{reach:.4g} Hz, which is good to {reach / LEAST_REACH:.4g} Hz; beyond, seats '
+                   f'may be off by factors{way}')
+
+
+def _odd_shapes(index: int, body: FlexibleBody) -> Iterator[str]:
+    """Yield that the shapes of modes do not look like those of unit modal mass."""
+    if not len(body.stiffness):
+        return
+    moving = [row for row, dof in enumerate(body.dofs) if dof.axis in DOFS[:3]]
+    lowest = np.abs(body.shapes[moving, body.stiffness.argmin()]).max(initial=0.0)
+    beside = float(lowest * np.sqrt(body.mass[0, 0]))
+    if not 1.0 / _FAR_OFF < beside < _FAR_OFF:
+        yield (f'foundations.{index}.flexible.modes: shapes of the lowest mode reach '
+               f'{beside:.3g} times one over the root of the mass, which is about 2 of a slab: '
+               'are they of unit modal mass, in kg?')

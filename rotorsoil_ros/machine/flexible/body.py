@@ -88,6 +88,8 @@ class FlexibleBody:
     bed : str
         How the ground stands below several contacts: `winkler`, `green` or `each`; empty for one;
         `grounded` where none is needed.
+    reach : float
+        Frequency up to which no mode is left out [rad/s].
 
     References
     ----------
@@ -105,6 +107,7 @@ class FlexibleBody:
     loss: FloatArray
     residual_loss: float
     bed: str = ''
+    reach: float = np.inf
 
     def __post_init__(self) -> None:
         count, modes = len(self.dofs), len(self.stiffness)
@@ -218,12 +221,13 @@ class FlexibleBody:
 
     def stiffer(self, factor: float) -> Self:
         """Return the same body of another modulus."""
-        return replace(self, stiffness=factor * self.stiffness, residual=self.residual / factor)
+        return replace(self, stiffness=factor * self.stiffness, residual=self.residual / factor,
+                       reach=np.sqrt(factor) * self.reach)
 
     def heavier(self, factor: float) -> Self:
         """Return the same body with more mass everywhere."""
         return replace(self, mass=factor * self.mass, stiffness=self.stiffness / factor,
-                       shapes=self.shapes / np.sqrt(factor))
+                       shapes=self.shapes / np.sqrt(factor), reach=self.reach / np.sqrt(factor))
 
     @cached_property
     def static_size(self) -> FloatArray:
@@ -262,7 +266,8 @@ class FlexibleBody:
         """
         rows = np.array([dof.rigid_row for dof in dofs])
         return cls(tuple(dofs), mass, rows, shapes, frequencies**2, residual,
-                   np.full(len(frequencies), loss_factor), loss_factor)
+                   np.full(len(frequencies), loss_factor), loss_factor,
+                   reach=float(np.max(frequencies, initial=0.0)))
 
     def to_plain(self) -> dict[str, Any]:
         """Return everything as lists and numbers."""
@@ -281,7 +286,8 @@ class FlexibleBody:
             ('stiffness', (modes,)), ('residual', (count, count)), ('loss', (modes,)))}
         return cls(dofs=tuple(Dof(station, axis, kind, tuple(place), area)
                               for station, axis, kind, place, area in plain['dofs']),
-                   residual_loss=plain['residual_loss'], bed=plain['bed'], **arrays)
+                   residual_loss=plain['residual_loss'], bed=plain['bed'],
+                   reach=plain['reach'], **arrays)
 
 
 def moved_to(place: tuple[float, float, float]) -> FloatArray:

@@ -26,6 +26,9 @@ _FIRST_MODES = 40
 # Shares of the stiffness that make it definite, for the search of modes.
 _SHIFT = 1e-3
 
+# An elastic mode that is slower than this share of the highest is a part that hangs on nothing.
+_LOOSE = 1e-4
+
 
 @dataclass(frozen=True)
 class FiniteElements:
@@ -54,7 +57,7 @@ class FiniteElements:
     @classmethod
     def of(
         cls, stiffness: Sparse, mass: Sparse, interface: Sequence[Dof], pick: Sparse,
-        known: Sequence[tuple[int, Dof]],
+        known: Mapping[int, Dof],
     ) -> 'FiniteElements':
         """
         Check matrices and return them with their rigid motion.
@@ -65,7 +68,7 @@ class FiniteElements:
             Of the same motions.
         interface, pick
             As the attributes.
-        known : sequence of (int, Dof)
+        known : mapping of int to Dof
             Those motions of the matrices of which somebody knows the place; the others follow
             them at rest.
 
@@ -76,14 +79,17 @@ class FiniteElements:
 
         """
         for name, matrix in (('stiffness', stiffness), ('mass', mass)):
-            skew = abs(matrix - matrix.T).max() / (abs(matrix).max() or 1.0)
-            require(skew <= _SYMMETRIC, name, f'symmetric within {_SYMMETRIC:g} of its largest '
-                    'entry', skew)
+            require_symmetric(name, matrix)
+            least = float(matrix.diagonal().min())
+            require(least >= 0.0, name, '>= 0 on its diagonal', least)
+        require(bool(stiffness.diagonal().max() > 0.0), 'stiffness', '> 0 N/m somewhere', 0.0)
         if stiffness.shape != mass.shape:
             raise RotorSoilError(f'mass must be of the {stiffness.shape[0]} motions of the '
                                  f'stiffness, got {mass.shape[0]}')
-        rigid = _rigid(stiffness, [index for index, _ in known],
-                       np.array([dof.rigid_row for _, dof in known]).reshape(-1, 6))
+        rigid = _rigid(stiffness, list(known), np.array(
+            [dof.rigid_row for dof in known.values()]).reshape(-1, 6))
+        least = float((rigid.T @ (mass @ rigid)).diagonal().min())
+        require(least > 0.0, 'mass', '> 0 kg in every rigid motion', least)
         return cls(stiffness, mass, tuple(interface), pick, rigid)
 
     @classmethod
@@ -93,7 +99,7 @@ class FiniteElements:
         pick = scipy.sparse.csc_matrix(
             (np.ones(len(dofs)), (np.arange(len(dofs)), list(dofs))), shape=(len(dofs), size))
         return cls.of(scipy.sparse.csc_matrix(stiffness), scipy.sparse.csc_matrix(mass),
-                      tuple(dofs.values()), pick, tuple(dofs.items()))
+                      tuple(dofs.values()), pick, dofs)
 
     @property
     def held(self) -> float:
@@ -121,16 +127,19 @@ class FiniteElements:
             raise RotorSoilError(
                 f'stiffness must be that of a body that nothing holds, got forces of rigid motion '
                 f'of {self.held:.2g} of its largest entry, more than {_FREE:g}: take out springs '
-                'to the ground, or say grounded: true of a body that stands on nothing else')
+                'to the ground, or say grounded: true of a body that stands on nothing else; or '
+                'its file has too few digits (nine are enough), or places other than the matrices')
         mass = self.rigid.T @ (self.mass @ self.rigid)
         squares, shapes = self._modes(highest)
         residual = self._static(mass) - (shapes / squares) @ shapes.T
         return FlexibleBody(
             self.interface, mass, self.pick @ self.rigid, shapes, squares,
-            0.5 * (residual + residual.T), np.full(len(squares), loss), loss)
+            0.5 * (residual + residual.T), np.full(len(squares), loss), loss, reach=highest)
 
     def grounded(self, highest: float, *, loss: float) -> FlexibleBody:
         """Return the body where its stiffness already holds it: a contact that does not move."""
+        if self.held <= _FREE:
+            raise RotorSoilError('grounded must be false of a body that nothing holds, got true')
         squares, shapes = self._modes(highest, rigid=0)
         static = self.pick @ scipy.sparse.linalg.splu(self.stiffness).solve(self.pick.T.toarray())
         residual = static - (shapes / squares) @ shapes.T
@@ -142,7 +151,7 @@ class FiniteElements:
             np.concatenate([np.zeros((len(shapes), 6)), np.eye(6)]),
             np.concatenate([shapes, nothing]), squares,
             scipy.linalg.block_diag(0.5 * (residual + residual.T), np.zeros((6, 6))),
-            np.full(len(squares), loss), loss, GROUNDED)
+            np.full(len(squares), loss), loss, GROUNDED, highest)
 
     def _modes(self, highest: float, rigid: int = 6) -> tuple[FloatArray, FloatArray]:
         """Return squared frequencies up to one and shapes at the interface, of unit mass."""
@@ -152,13 +161,23 @@ class FiniteElements:
         if size <= _DENSE:
             stiffness, mass = self.stiffness.toarray(), self.mass.toarray()
             # Mass on the left: motions without mass have zero there, not infinity.
-            inverse, shapes = scipy.linalg.eigh(mass, stiffness + shift * mass)
+            try:
+                inverse, shapes = scipy.linalg.eigh(mass, stiffness + shift * mass)
+            except scipy.linalg.LinAlgError as error:
+                raise _indefinite() from error
             keep = inverse > 1.0 / (highest**2 + shift)
             found = 1.0 / inverse[keep] - shift, shapes[:, keep] / np.sqrt(inverse[keep])
         else:
             found = self._some_modes(highest, shift)
-        order = np.argsort(found[0])[rigid:]
-        return found[0][order], self.pick @ found[1][:, order]
+        order = np.argsort(found[0])
+        squares = found[0][order]
+        if squares.min(initial=0.0) < -shift:
+            raise _indefinite()
+        if len(squares) > rigid and squares[rigid] < _LOOSE**2 * highest**2:
+            raise RotorSoilError(
+                f'stiffness must hold the body together, got {rigid + 1} motions or more that '
+                'nothing resists')
+        return squares[rigid:], self.pick @ found[1][:, order[rigid:]]
 
     def _some_modes(self, highest: float, shift: float) -> tuple[FloatArray, FloatArray]:
         size, count = self.stiffness.shape[0], _FIRST_MODES
@@ -187,8 +206,12 @@ class FiniteElements:
         scale = abs(self.stiffness).max() / np.abs(carried).max(axis=0)
         border = scipy.sparse.csc_matrix(carried * scale)
         system = scipy.sparse.bmat([[self.stiffness, border], [border.T, None]], format='csc')
-        found = scipy.sparse.linalg.splu(system).solve(
-            np.concatenate([loads, np.zeros((6, loads.shape[1]))]))
+        try:
+            found = scipy.sparse.linalg.splu(system).solve(
+                np.concatenate([loads, np.zeros((6, loads.shape[1]))]))
+        except RuntimeError as error:
+            raise RotorSoilError('stiffness must hold the body together: some of its motions '
+                                 'nothing resists') from error
         elastic = found[:len(loads)]
         elastic -= self.rigid @ np.linalg.solve(mass, carried.T @ elastic)
         return np.asarray(self.pick @ elastic)
@@ -209,3 +232,16 @@ def _rigid(stiffness: Sparse, known: list[int], rows: FloatArray) -> FloatArray:
             raise RotorSoilError('stiffness must hold the motions whose place the dofs do not '
                                  'say: they do not follow the others') from error
     return rigid
+
+
+def require_symmetric(
+    name: str, matrix: Sparse | FloatArray, share: float = _SYMMETRIC,
+) -> None:
+    """Raise a RotorSoilError if a matrix is not symmetric within a share of its largest entry."""
+    skew = float(abs(matrix - matrix.T).max() / (abs(matrix).max() or 1.0))
+    require(skew <= share, name, f'symmetric within {share:g} of its largest entry', skew)
+
+
+def _indefinite() -> RotorSoilError:
+    return RotorSoilError('stiffness and mass must not be negative in any direction, as those of '
+                          'a body are')

@@ -135,6 +135,24 @@ def test_a_body_out_of_a_log_needs_no_file(folder, tmp_path):
     assert again.foundations[0].body == machine.case.foundations[0].body
 
 
+def test_foundation_of_machines_with_other_speeds_comes_out_of_a_log(folder, tmp_path):
+    """Each asks for modes up to its own speed; the document has them all."""
+    from rotorsoil_ros.case.config import case_of
+
+    machine = loaded(folder, 'fans', 'machines.1.speed_range_rpm=[300, 1600]')
+    again = case_of(tmp_path / 'gone.yaml', dict(machine.case.content),
+                    files=machine.case.files, cache_directory=tmp_path / 'cache')
+    assert again.foundations[0].body == machine.case.foundations[0].body
+
+
+def test_verbs_say_beyond_which_frequency_modes_are_too_few(folder, capsys):
+    for top, said in ((140, False), (150, True)):
+        main(['seats', str(folder / 'fan.yaml'), '--hz', f'5:{top}:2', '-o', '-', '--cache',
+              str(folder / 'cache')])
+        assert ('known by modes up to 292.9 Hz, which is good to 146.5 Hz'
+                in capsys.readouterr().err) is said
+
+
 @pytest.mark.parametrize('name, settings, said', [
     ('fan', ['foundations.0.flexible.residual=null'],
      'foundations.0.flexible.residual: is missing; without the residual flexibility 60 modes'),
