@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from rotorsoil_ros.case.plant.together import Plant, Shaken
     from rotorsoil_ros.channel import Channel
     from rotorsoil_ros.errors import InputError, NotSolvedError, OutOfTableError, RotorSoilError
-    from rotorsoil_ros.events import Profile
     from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
     from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
     from rotorsoil_ros.ground.boundary.site import Site
@@ -62,6 +61,7 @@ if TYPE_CHECKING:
     from rotorsoil_ros.monitor.rules import Matching
     from rotorsoil_ros.monitor.verdict import Verdict
     from rotorsoil_ros.prediction import Bounds, Prediction, Response
+    from rotorsoil_ros.profile import Profile
     from rotorsoil_ros.rotor.assembly import Rotor
     from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
     from rotorsoil_ros.rotor.disc import Disc
@@ -101,7 +101,7 @@ _ROOMS = {
     'case.plant.together': ('Plant', 'Shaken'),
     'channel': ('Channel',),
     'errors': ('InputError', 'NotSolvedError', 'OutOfTableError', 'RotorSoilError'),
-    'events': ('Profile',),
+    'profile': ('Profile',),
     'ground.boundary.layered_model': ('LayeredSiteModel',),
     'ground.boundary.model': ('BoundaryElementModel',),
     'ground.boundary.site': ('Site',),

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.prediction import Prediction
-from rotorsoil_ros.units import rad_s_to_rpm
 
 NANOSECONDS = 1_000_000_000
 LAST_STAMP = (1 << 31) * NANOSECONDS - 1  # seconds of a stamp are an int32: until 2038
@@ -24,32 +23,6 @@ class Level(IntEnum):
     WARN = 1
     ERROR = 2
     STALE = 3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Profile:
-    """
-    Which speeds a machine ran at.
-
-    Attributes
-    ----------
-    machine : str
-        Its name, empty if the topic tells none.
-    stamp_ns : (n,) int array
-        When [ns].
-    speed : (n,) float array
-        [rad/s].
-
-    """
-
-    machine: str
-    stamp_ns: IntArray
-    speed: FloatArray
-
-    @property
-    def speed_rpm(self) -> FloatArray:
-        """Speeds, (n,) [rpm]."""
-        return rad_s_to_rpm(self.speed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,6 +269,30 @@ _ARRAYS = tuple(entry.name for entry in fields(Compared)
                 if entry.name not in ('machine', 'channels', 'beside'))
 
 
+@dataclass(frozen=True, slots=True)
+class Grounded:
+    """
+    What ground that moves by itself did to a machine, once per turn.
+
+    Attributes
+    ----------
+    machine : str
+        Name of the machine.
+    stamp_ns : (n,) int array
+        Middle of the turns over which sensors on the ground were heard [ns].
+    motion : (n, 3) complex array
+        Of the ground along x, y, z as if the machine did not stand on it [m].
+    prediction : Prediction
+        What that motion does to every channel.
+
+    """
+
+    machine: str
+    stamp_ns: IntArray
+    motion: ComplexArray
+    prediction: Prediction
+
+
 class Reason(StrEnum):
     """Why a measured point is not held against its prediction."""
 
@@ -393,6 +390,6 @@ class Model:
 
 
 Event: TypeAlias = (
-    Predicted | Measured | Band | Samples | Demodulated | Compared | Weighed | Expected | Zoned
-    | Remark | Diagnostics | Model)
+    Predicted | Measured | Band | Samples | Demodulated | Compared | Grounded | Weighed | Expected
+    | Zoned | Remark | Diagnostics | Model)
 Sink: TypeAlias = Callable[[Event], None]

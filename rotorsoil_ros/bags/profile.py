@@ -12,11 +12,17 @@ from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.reader import CDR, Source
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import Profile
+from rotorsoil_ros.profile import Profile
 from rotorsoil_ros.wire.cdr import ARRAYS
 from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
-from rotorsoil_ros.wire.handlers import OIL_TOPIC, raw_channel, SPEED_TOPICS, TOPICS
-from rotorsoil_ros.wire.messages import JointStateWriter, NODE_NAME, OWN_TOPICS, Records
+from rotorsoil_ros.wire.handlers import ground_sensor, OIL_TOPIC, raw_channel, SPEED_TOPICS, TOPICS
+from rotorsoil_ros.wire.messages import (
+    JointStateWriter,
+    NODE_NAME,
+    own_name,
+    OWN_TOPICS,
+    Records,
+)
 from rotorsoil_ros.wire.speeds import ROTOR_JOINT, SpeedReader, SpeedSource, USUAL
 
 SPEEDS_AT_ONCE = 1024
@@ -35,6 +41,11 @@ class Place:
     machine: str
     name: str
 
+    @property
+    def below(self) -> str:
+        """Below which topic it stands: the machine's, or the plant's."""
+        return f'{self.namespace}/{self.machine}'
+
 
 @dataclass(frozen=True, slots=True)
 class Input:
@@ -52,7 +63,12 @@ class Input:
     @property
     def tells_vibration(self) -> bool:
         """Whether it tells how something vibrates."""
-        return not self.tells_speed and self.place.name != OIL_TOPIC
+        return not (self.tells_speed or self.tells_ground or self.place.name == OIL_TOPIC)
+
+    @property
+    def tells_ground(self) -> bool:
+        """Whether it tells how the ground beside a machine moves."""
+        return bool(ground_sensor(self.place.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +114,15 @@ def is_called(machine: str, name: str) -> bool:
 
 def answered(topic: str, plants: Collection[str]) -> tuple[str, str]:
     """Return which machine a topic answers for, and which of OWN_TOPICS it is, or nothing."""
-    name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len, default='')
+    name = own_name(topic)
     return (_below(topic, name, plants).machine, name) if name else ('', '')
 
 
 def _names(topic: str) -> Iterator[str]:
     """Yield the names of inputs that a topic ends with."""
     yield from (name for name in TOPICS if topic.endswith(f'/{name}'))
-    if raw_channel(last := '/'.join(topic.split('/')[-3:])):
+    last = '/'.join(topic.split('/')[-3:])
+    if raw_channel(last) or ground_sensor(last):
         yield last
 
 

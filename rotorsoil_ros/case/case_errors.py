@@ -140,10 +140,11 @@ class Faults:
         rotor = self.entries.rotor
         groups: list[tuple[Place, Sequence[
             schema.FoundationEntry | schema.DiscEntry | BearingEntry
-            | schema.ProbeEntry | schema.GroundProbeEntry]]] = [
+            | schema.ProbeEntry | schema.GroundProbeEntry | schema.GroundSensorEntry]]] = [
             (('foundations',), self.entries.foundations), (('rotor', 'discs'), rotor.discs),
             (('rotor', 'bearings'), rotor.bearings), (('rotor', 'probes'), rotor.probes),
-            (('ground', 'probes'), self.entries.ground.probes)]
+            (('ground', 'probes'), self.entries.ground.probes),
+            (('ground', 'sensors'), self.entries.ground.sensors)]
         return [((*group, index), entry.name) for group, entries in groups
                 for index, entry in enumerate(entries)]
 

@@ -275,7 +275,8 @@ class _Builder:
             model = self._model(rotor, foundations, unbalances.couples())
         if model is not None and probes is not None:
             sensors = sensors_of(faults, [*model.channels, *(
-                Channel(probe.name, '', axis) for probe in probes for axis in DOFS[:3])])
+                Channel(probe.name, '', axis) for probe in probes for axis in DOFS[:3])],
+                model.foundations)
         if (rotor is None or foundations is None or embedments is None or probes is None
                 or unbalance is None or speed_range is None or tables is None or oils is None
                 or journals is None or uncertainty is None or zones is None or sensors is None):

@@ -102,7 +102,7 @@ def reload(
 def _complete(file: Path, cache_directory: str | Path | None) -> Machine:
     """Return a machine with its table: a callback must not have to wait for it."""
     machine = Machine.load(file, cache_directory=cache_directory)
-    _ = machine.table, machine.oils
+    _ = machine.table, machine.oils, machine.ground
     return machine
 
 

@@ -15,14 +15,14 @@ from rotorsoil_ros.case.answers.modal import ModalAnswers
 from rotorsoil_ros.case.journal_entries import bearing_states, BearingStates
 from rotorsoil_ros.channel import across, Channel
 from rotorsoil_ros.errors import InputError, NotSolvedError
-from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.machine.transient.state import Transient
-from rotorsoil_ros.machine.transmissibility import Transmissibility
+from rotorsoil_ros.machine.transmissibility import MovingGround, Transmissibility
 from rotorsoil_ros.prediction import Bounds, columns_of, Response
+from rotorsoil_ros.profile import Profile
 from rotorsoil_ros.units import hz_to_rad_s, rpm_to_rad_s
 
 if TYPE_CHECKING:
@@ -79,6 +79,13 @@ class Machine(ModalAnswers):
         """The same by mean temperature of the oil films [deg C], for those that the case names."""
         return {celsius: Machine(self.case.with_oil_of(celsius), self.directory).table
                 for celsius in self.case.oil_temperatures}
+
+    @cached_property
+    def ground(self) -> MovingGround | None:
+        """What it does of ground that moves; None where no sensor of the case stands there."""
+        if not self.case.sensors.ground:
+            return None
+        return models.moving_ground(self.case, self.model, self.directory)
 
     def response(self, *, rpm: Numbers) -> Response:
         """

@@ -12,7 +12,7 @@ import rotorsoil_ros
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.case.design.below import identity, soil_models
+from rotorsoil_ros.case.design.below import around, identity, soil_models
 from rotorsoil_ros.case.design.ground import band_contents
 from rotorsoil_ros.case.design.shapes import other_forms
 from rotorsoil_ros.case.design.tables import (
@@ -24,6 +24,7 @@ from rotorsoil_ros.case.design.tables import (
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.flexible.ground import bed_of
 from rotorsoil_ros.case.summary import stability_doubts, unstable
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import RotorSoilError, solved
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
 from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
@@ -45,6 +46,7 @@ from rotorsoil_ros.machine.plant.source import SourceModel
 from rotorsoil_ros.machine.response import ResponseTable, TOLERANCE
 from rotorsoil_ros.machine.spread import Place, SoilSpread
 from rotorsoil_ros.machine.transient.poles import Poles
+from rotorsoil_ros.machine.transmissibility import GroundTable, MovingGround
 
 # What a message holds of an answer, in a log that has to explain itself.
 UNITS = {
@@ -132,6 +134,46 @@ def response_table(case: Case, model: CoupledModel, directory: Path) -> Response
                 arrays, model.channels),
             solve=lambda: ResponseTable.build(model, case.speed_range))
     return _followed(case, replace(table, key=key))
+
+
+def moving_ground(case: Case, model: CoupledModel, directory: Path) -> MovingGround:
+    """
+    Return what a machine does of ground that moves, and what it does to sensors there.
+
+    Its table is computed and stored if the cache does not hold it.
+
+    Parameters
+    ----------
+    case, model, directory
+        As `response_table`.
+
+    Raises
+    ------
+    RotorSoilError
+        If the case cannot be solved.
+
+    """
+    rated = case.speed_range[1] if case.berth is None else case.berth.rated_speed
+    cache = Cache(directory)
+    key = content_key('moving ground', 1, response_key(case, model), rated)
+    arrays = cache.load('ground', key)
+    if arrays is None:
+        with solved('the response of this machine to ground that moves'):
+            table = GroundTable.build(model, case.speed_range, rated=rated)
+        cache.store('ground', key, table.to_arrays())
+    else:
+        table = GroundTable.from_arrays(arrays, model.channels)
+    loads = np.array([model.channels.index(Channel(block.name, '', dof))
+                      for block in model.foundations for dof in DOFS], dtype=int)
+    sensors = len(case.sensors.ground)
+    others = () if case.berth is None else tuple(
+        one.speed for one in case.berth.neighbours if one.speed)
+    try:
+        with solved('the ground beside this machine'):
+            beside = around(case, cache)
+    except RotorSoilError as error:
+        return MovingGround(table, loads, sensors, others, None, str(error))
+    return MovingGround(table, loads, sensors, others, beside)
 
 
 def response_band(

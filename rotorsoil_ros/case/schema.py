@@ -196,12 +196,6 @@ class GroundProbeEntry(Entry):
     place: PlaceEntry
 
 
-class GroundEntry(Entry):
-    """What is asked of the ground beside the blocks."""
-
-    probes: list[GroundProbeEntry] = Field(default_factory=list)
-
-
 class UnbalanceEntry(Entry):
     """Unbalance on one disc: a moment, or what a balance grade permits, and a couple."""
 
@@ -268,6 +262,21 @@ class PickupEntry(Entry):
     heading_deg: Degree | None = None
     stamps: Literal['packets'] | None = None
     anti_alias: StrictBool | None = None
+
+
+class GroundSensorEntry(PickupEntry):
+    """Accelerometer on the ground: where it stands, and what is known of it."""
+
+    name: Name
+    place: PlaceEntry
+
+
+class GroundEntry(Entry):
+    """What is asked of the ground beside the blocks, and what is measured there."""
+
+    probes: list[GroundProbeEntry] = Field(default_factory=list)
+    sensors: list[GroundSensorEntry] = Field(default_factory=list)
+    of: Name | None = None
 
 
 class SensorsEntry(PickupEntry):

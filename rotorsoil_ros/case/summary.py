@@ -18,6 +18,7 @@ from rotorsoil_ros.case.design.ground import (
     of_site,
 )
 from rotorsoil_ros.case.design.rigidity import bending_told
+from rotorsoil_ros.case.design.sensing import of_sensors, sensors_told
 from rotorsoil_ros.case.flexible.words import bodies_told, of_bodies
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
@@ -94,6 +95,7 @@ def derived_quantities(
     yield from bending_told(case, soil_models)
     yield from bodies_told(case)
     yield from of_site(case, soil_models)
+    yield from sensors_told(case)
     for journal in case.journals:
         yield from of_journal(case, journal)
     yield from of_seals(case)
@@ -158,6 +160,7 @@ def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[s
     yield from of_neighbours(case)
     yield from of_shapes(case, shapes)
     yield from of_bodies(case)
+    yield from of_sensors(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):

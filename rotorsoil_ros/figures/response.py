@@ -44,7 +44,7 @@ def all_figures(
     """Yield name and figure of every picture of a case."""
     predictor = table.predictor(case.unbalance)
     yield 'machine', machine_drawing(case)
-    if case.support.model == 'boundary_elements' or case.berth is not None:
+    if case.support.model == 'boundary_elements' or case.berth or case.sensors.ground:
         yield 'plan', site_plan(case)
     if case.support.model != 'rigid':
         yield 'support', support(case, model)

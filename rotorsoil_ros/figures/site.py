@@ -8,6 +8,8 @@ from matplotlib.patches import Circle as Round, Rectangle as Box
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.entries.sensors import GroundSensor
+from rotorsoil_ros.case.entries.site import GroundProbe
 from rotorsoil_ros.case.plant.berth import mounts, placed
 from rotorsoil_ros.ground.soil import Circle, extents, parts_of
 from rotorsoil_ros.machine.flexible.lattice import Lattice
@@ -16,20 +18,23 @@ from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.rotor.assembly import Rotor
 
 _CONCRETE, _SHAFT, _PROBE, _FRAME = '#c9c9c4', '#0072b2', '#d55e00', '#8a8a85'
+_SENSOR = '#009e73'
 _MARGIN = 0.06
 _WIDTH, _TALLEST = 7.5, 7.0
 
 
 def site_plan(case: Case) -> Figure:
-    """Draw blocks, shafts, bearings and probes on the ground of a case, from above."""
+    """Draw blocks, shafts, bearings, probes and sensors on the ground of a case, from above."""
     left, right, first, last = frame(case)
     height = min(_WIDTH * (last - first) / (right - left) + 1.0, _TALLEST)
     figure = Figure(figsize=(_WIDTH, height), layout='constrained')
     axes = figure.subplots()
     draw_plan(axes, case)
     named = case.name if case.berth is None else case.berth.plant
-    axes.set_title(f'{named}: blocks, shafts and probes from above; + centre of a contact',
-                   fontsize=9)
+    beside = [words for words, some in (('probes', case.ground_probes),
+                                        ('sensors on the ground', case.sensors.ground)) if some]
+    axes.set_title(f'{named}: {" and ".join(["blocks, shafts", *beside])} from above; + centre '
+                   'of a contact', fontsize=9)
     return figure
 
 
@@ -39,14 +44,19 @@ def draw_plan(axes: Axes, case: Case) -> None:
         _draw_block(axes, case, block)
     for name, rotor, place in placed(case):
         _draw_shaft(axes, name if case.berth else '', rotor, place)
-    for probe in case.ground_probes:
-        axes.plot(probe.x, probe.y, marker='^', color=_PROBE, markersize=7)
-        axes.annotate(probe.name, (probe.x, probe.y), xytext=(0, 7), textcoords='offset points',
+    for one in _beside(case):
+        marker, colour = ('o', _SENSOR) if isinstance(one, GroundSensor) else ('^', _PROBE)
+        axes.plot(one.x, one.y, marker=marker, color=colour, markersize=7)
+        axes.annotate(one.name, (one.x, one.y), xytext=(0, 7), textcoords='offset points',
                       fontsize=7, ha='center')
     left, right, first, last = frame(case)
     axes.set(xlim=(left, right), ylim=(first, last), aspect='equal', xlabel='x across [m]',
              ylabel='y along [m]')
     axes.grid(alpha=0.3)
+
+
+def _beside(case: Case) -> list[GroundProbe | GroundSensor]:
+    return [*case.ground_probes, *case.sensors.ground]
 
 
 def _draw_shaft(axes: Axes, name: str, rotor: Rotor, place: Placement) -> None:
@@ -98,7 +108,7 @@ def frame(case: Case) -> tuple[float, float, float, float]:
         across, along = extents(block.contact)
         x += [block.centre_x + side for side in across]
         y += [block.centre_y + side for side in along]
-    x += [probe.x for probe in case.ground_probes]
-    y += [probe.y for probe in case.ground_probes]
+    x += [one.x for one in _beside(case)]
+    y += [one.y for one in _beside(case)]
     edge = _MARGIN * max(max(x) - min(x), max(y) - min(y))
     return min(x) - edge, max(x) + edge, min(y) - edge, max(y) + edge

@@ -289,18 +289,17 @@ class CoupledModel:
             first = end
         return np.concatenate([*ports, *housings, loads[first:len(loads) - self._on_ground]])
 
-    def ground_response(
-        self, omega: FloatArray, *, speed: float,
-    ) -> tuple[ComplexArray, ComplexArray]:
+    def ground_response(self, omega: FloatArray, *, speed: float | None) -> tuple[
+            ComplexArray, ComplexArray]:
         """
-        Solve for the response to ground that moves, while the rotor turns at fixed speed.
+        Solve for the response to ground that moves.
 
         Parameters
         ----------
         omega : (n,) float array
             Frequency of the motion [rad/s].
-        speed : float
-            Rotor speed [rad/s].
+        speed : float or None
+            Fixed rotor speed [rad/s]; None: the ground moves once per turn, at any speed.
 
         Returns
         -------
@@ -311,6 +310,8 @@ class CoupledModel:
         """
         omega = np.asarray(omega, dtype=float)
         still = self._on_rotor(np.zeros((2 * len(self.ports), 3), dtype=complex))
+        if speed is None:
+            return self._respond(self._synchronous_modes, omega, omega, still, np.eye(3))
         return self._at(speed, omega, still, np.eye(3))
 
     def _at(

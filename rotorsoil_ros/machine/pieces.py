@@ -99,6 +99,17 @@ class Pieces:
         edges, pieces, _ = self._plain
         return pieces[bisect_right(edges, place)]
 
+    def at(self, place: FloatArray) -> ComplexArray:
+        """Return the polynomials themselves at places (n,), (n, p, w); NaN where none holds."""
+        index = self.find(place)
+        known = index >= 0
+        values = np.full((len(place), *self.coefficients.shape[2:]), complex(np.nan, np.nan))
+        left, right = self.edges[index[known]], self.edges[index[known] + 1]
+        along = ((place[known] - left) - (right - place[known])) / (right - left)
+        values[known] = np.einsum('nd,ndpw->npw', along[:, None] ** np.arange(DEGREE + 1),
+                                  self.coefficients[index[known]])
+        return values
+
     def powers_of_one(self, place: float, piece: int) -> list[float]:
         """Return the squared place times the powers of where it is in its piece."""
         edges = self._plain[2]
@@ -165,6 +176,7 @@ def summed(weights: FloatArray, rows: FloatArray, out: FloatArray | None = None)
 
 def refine(
     solve: Solver, edges: FloatArray, *, groups: IntArray, tolerance: float, columns: int,
+    floor: float = _ROUND_OFF,
 ) -> Pieces:
     """
     Halve pieces until polynomials through their nodes are right between the nodes.
@@ -184,6 +196,8 @@ def refine(
         Relative to the local magnitude of each value.
     columns : int
         p + q, which bounds how many pieces are looked at together.
+    floor : float
+        Share of the largest value of its kind that is as good as nothing.
 
     Returns
     -------
@@ -212,7 +226,8 @@ def refine(
         for start in range(0, len(left), most):
             part = slice(start, start + most)
             closed, good, values = _look(solve, left[part], right[part], along, between,
-                                         groups=groups, tolerance=tolerance, high=high)
+                                         groups=groups, tolerance=tolerance, high=high,
+                                         floor=floor)
             coefficients = np.einsum('ij,kj...->ki...', powers, values[closed, ::2])
             done.append((left[part][closed], right[part][closed], good[closed], coefficients))
             halved.append((left[part][~closed], right[part][~closed]))
@@ -227,7 +242,7 @@ def refine(
 
 def _look(
     solve: Solver, left: FloatArray, right: FloatArray, along: FloatArray, between: FloatArray, *,
-    groups: IntArray, tolerance: float, high: float,
+    groups: IntArray, tolerance: float, high: float, floor: float,
 ) -> tuple[BoolArray, BoolArray, ComplexArray]:
     """Return which pieces need no halving, which of them are right, and their values."""
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
@@ -235,15 +250,15 @@ def _look(
     speed = np.clip(middle[:, None] + half[:, None] * along, left[:, None], right[:, None])
     wanted, probing = (values.reshape(len(left), len(along), *values.shape[1:])
                        for values in solve(speed.ravel()))
-    good = _matches(wanted, between, groups, tolerance)
+    good = _matches(wanted, between, groups, tolerance, floor)
     short = right - left <= _SHORTEST * high
-    clear = (_matches(probing, between, groups, _PROBE_TOLERANCE)
+    clear = (_matches(probing, between, groups, _PROBE_TOLERANCE, _ROUND_OFF)
              | (right - left <= _PROBE_SHORTEST * high))
     return np.asarray((good & clear) | short), good, wanted
 
 
 def _matches(
-    values: ComplexArray, between: FloatArray, groups: IntArray, tolerance: float,
+    values: ComplexArray, between: FloatArray, groups: IntArray, tolerance: float, floor: float,
 ) -> BoolArray:
     """Return for each piece whether the polynomial meets all values between its nodes."""
     exact = values[:, 1::2]
@@ -253,5 +268,5 @@ def _matches(
         same = groups == group
         largest[..., same] = size[..., same].max(axis=-1, keepdims=True)
     deviation = np.abs(np.einsum('ij,kj...->ki...', between, values[:, ::2]) - exact)
-    return np.asarray(np.all(deviation <= tolerance * size + _ROUND_OFF * largest,
+    return np.asarray(np.all(deviation <= tolerance * size + floor * largest,
                              axis=(1, 2, 3)))

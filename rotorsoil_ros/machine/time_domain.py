@@ -54,7 +54,7 @@ class Shaking:
 
 def shake(
     model: CoupledModel, time: FloatArray, speed: FloatArray, *, moment: FloatArray,
-    phase: FloatArray,
+    phase: FloatArray, ground: FloatArray | None = None,
 ) -> Shaking:
     """
     Integrate the machine through a run, from rest.
@@ -71,9 +71,12 @@ def shake(
         Unbalance of every disc over time [kg m].
     phase : (p,) float array
         Of every disc [rad].
+    ground : (n, 3) float array or None
+        Acceleration of the ground along x, y, z where nothing stands on it [m/s^2].
 
     Notes
     -----
+    Ground that moves carries everything along: relative to it all that has mass feels -m a.
     Soil acts as spring and dashpot with the compliance at the momentary speed: exact for what
     turns with the rotor, a good stand-in for free vibration near it (theory manual, passage).
     Newmark's error is (omega dt)^2 / 12 of a frequency.
@@ -93,10 +96,12 @@ def shake(
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
     force = unbalance_force(angle[:, None] + phase, speed[:, None], rate[:, None], moment=moment)
     load = np.concatenate(force, axis=1) @ system.discs.T
-    motion = _newmark(system, speed, load, step)
+    carried = np.zeros((len(time), 3)) if ground is None else ground
+    motion = _newmark(system, speed, load - carried @ system.inertia.T, step)
     names = tuple(channel for bearing in model.rotor.bearings
                   for channel in across(bearing.name, HOUSING))
-    return Shaking(time, speed, angle, names, motion @ system.housings.T)
+    return Shaking(time, speed, angle, names,
+                   motion @ system.housings.T + carried @ system.carried.T)
 
 
 def unbalance_force(
@@ -145,7 +150,18 @@ class _System:
         # `_rows` has all x first, bearings have x and z in turn.
         order = np.arange(2 * len(rotor.bearings)).reshape(2, -1).T.ravel()
         self._stretch = journals[order] - self.housings
+        along = self._along(shapes)
+        self.inertia, self.carried = self.mass @ along, (
+            self.housings @ along + model.support.firm_rows)
         self._hold(blocks, np.array([speed.min(), speed.max()]))
+
+    def _along(self, shapes: FloatArray) -> FloatArray:
+        """Return what a unit motion (x, y, z) of the ground carries along, (d, 3)."""
+        support = self._model.support
+        # Deflections and slopes take turns.
+        own, *_ = np.linalg.lstsq(shapes, np.tile([1.0, 0.0], len(shapes) // 2))
+        return np.concatenate([*(np.outer(own, axis) for axis in support.mounts[0].axes),
+                               support.follow_rows])
 
     def _hold(self, blocks: int, speed: FloatArray) -> None:
         """Leave out what the soil holds entirely."""
@@ -154,6 +170,7 @@ class _System:
         kept = np.concatenate([np.arange(blocks), blocks + self._free])
         for name in ('mass', '_shaft', '_gyroscopic'):
             setattr(self, name, getattr(self, name)[np.ix_(kept, kept)])
+        self.inertia = self.inertia[kept]
         self.discs, self.housings = self.discs[kept], self.housings[:, kept]
         self._stretch = self._stretch[:, kept]
 

@@ -32,6 +32,7 @@ OIL_TOPIC = 'oil_temperature'
 MEASURED_TOPICS = {'measured/amplitude': JOINT_STATE, 'measured/phase': JOINT_STATE}
 TOPICS = SPEED_TOPICS | MEASURED_TOPICS | {OIL_TOPIC: TEMPERATURE}
 RAW_NAME = re.compile(r'measured/(\w+)/imu')
+GROUND_NAME = re.compile(r'ground/(\w+)/imu')
 
 Outlet: TypeAlias = Callable[[Records], None]
 Inlet: TypeAlias = Callable[[Sequence[int], Sequence[bytes]], None]
@@ -153,6 +154,17 @@ def _tell_samples(
         samples.acceleration[rows], samples.orientation[rows]))
 
 
+def _tell_ground(
+    monitor: Monitor, sensor: str, stamp_ns: IntArray, samples: Accelerations,
+    rows: Sequence[int],
+) -> None:
+    """Tell raw samples of a sensor on the ground."""
+    felt = samples.acceleration[rows]
+    monitor.on_ground(sensor, Samples(
+        monitor.machine, Channel(sensor, '', 'z'), stamp_ns, felt[:, AXES.index('z')],
+        samples.is_synthetic, felt, samples.orientation[rows]))
+
+
 def _tell_oil(
     monitor: Monitor, stamp_ns: IntArray, found: Temperatures, rows: Sequence[int],
 ) -> None:
@@ -166,6 +178,12 @@ def raw_channel(name: str) -> Channel | None:
     channel = Channel.parse(found[1]) if found else None
     # A sensor feels along an axis: a rotation cannot be measured so.
     return channel if channel and channel.axis in AXES else None
+
+
+def ground_sensor(name: str) -> str:
+    """Return the sensor of a name such as `ground/<sensor>/imu`; empty of other names."""
+    found = GROUND_NAME.fullmatch(name)
+    return found[1] if found else ''
 
 
 def inlet(
@@ -193,6 +211,9 @@ def inlet(
     """
     if channel := raw_channel(name):
         return StampedInlet(topic, IMU, ImuReader(), partial(_tell_samples, monitor, channel),
+                            note=monitor.health.note, log=log)
+    if sensor := ground_sensor(name):
+        return StampedInlet(topic, IMU, ImuReader(), partial(_tell_ground, monitor, sensor),
                             note=monitor.health.note, log=log)
     if name == OIL_TOPIC:
         return StampedInlet(topic, TEMPERATURE, Reader(TEMPERATURE, temperatures),

@@ -17,6 +17,7 @@ from rotorsoil_ros.events import (
     Demodulated,
     Diagnostics,
     Event,
+    Grounded,
     Level,
     Model,
     NANOSECONDS,
@@ -38,6 +39,9 @@ OWN_TOPICS = {
     'steady/phase': JOINT_STATE, 'residual': JOINT_STATE,
     'demodulated/amplitude': JOINT_STATE, 'demodulated/phase': JOINT_STATE, 'events': LOG,
     'model': STRING}
+
+# The same of a machine beside which sensors stand on the ground.
+GROUND_TOPICS = {'ground/amplitude': JOINT_STATE, 'ground/phase': JOINT_STATE}
 
 ROOT_2 = math.sqrt(2.0)
 
@@ -79,6 +83,8 @@ class Topics:
     demodulated_phase: str
     events: str
     model: str
+    ground_amplitude: str = ''
+    ground_phase: str = ''
     diagnostics: str = DIAGNOSTICS_TOPIC
     node: str = NODE_NAME
 
@@ -86,15 +92,23 @@ class Topics:
     def of(cls, namespace: str, machine: str) -> 'Topics':
         """Name the topics as a node that nobody renamed does; namespace `` or `/plant`."""
         node = f'{namespace}/{NODE_NAME}'
-        return cls.named({name: f'{node}/{machine}/{name}' for name in OWN_TOPICS}, node=node)
+        return cls.named({name: f'{node}/{machine}/{name}'
+                          for name in OWN_TOPICS | GROUND_TOPICS}, node=node)
 
     @classmethod
     def named(
         cls, topics: Mapping[str, str], *, diagnostics: str = DIAGNOSTICS_TOPIC, node: str,
     ) -> 'Topics':
-        """Take the full names of OWN_TOPICS, by what follows the machine's, and of the node."""
+        """Take full names of such topics by what follows the machine's, and that of the node."""
         return cls(diagnostics=diagnostics, node=node.strip('/'), **{
             name.replace('/', '_'): topic for name, topic in topics.items()})
+
+
+def own_name(topic: str) -> str:
+    """Return what follows the machine's name in a topic of ours; empty of any other."""
+    # Of `steady/amplitude` and `amplitude` the longer name is meant.
+    return max((name for name in OWN_TOPICS | GROUND_TOPICS if topic.endswith(f'/{name}')),
+               key=len, default='')
 
 
 def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
@@ -207,6 +221,12 @@ class Encoder:
                 residual = event.residual
                 yield self._states(self._topics.residual, channels, stamps, residual,
                                    speed[:, None] * residual)
+            case Grounded(stamp_ns=stamp_ns, prediction=part):
+                stamps = stamp_ns.tolist()
+                for topic, parts in ((self._topics.ground_amplitude, moduli(part)),
+                                     (self._topics.ground_phase, phases(part))):
+                    yield Records(topic, JOINT_STATE, stamps,
+                                  self._joint_states.write_parts(stamps, *parts))
             case Demodulated():
                 yield from self._demodulated(event)
             case Remark():

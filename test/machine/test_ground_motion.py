@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.ground.soil import RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.placement import Placement
+from rotorsoil_ros.machine.transmissibility import GroundTable, MovingGround
 
 from machines import elastic_machine, paper_machine, paper_rotor, shared, Springs, two_blocks
 
@@ -70,8 +71,18 @@ def test_heading_of_a_shaft_turns_what_it_sees_of_the_ground():
                                atol=1e-9)
 
 
-def test_points_on_the_ground_move_with_it_and_with_the_blocks_beside_them():
+@pytest.fixture(scope='module')
+def beside():
+    """Return two blocks on one ground, whose points are sensors, and what is known of these."""
     model = shared()
+    loads = np.array([model.channels.index(Channel(block.name, '', dof))
+                      for block in model.foundations for dof in DOFS])
+    table = GroundTable.build(model, (5.0, 140.0), rated=100.0)
+    return model, MovingGround(table, loads, 2, (), model.soil_models[0])
+
+
+def test_points_on_the_ground_move_with_it_and_with_the_blocks_beside_them(beside):
+    model, _ = beside
     omega = np.array([40.0])
     moved, force = model.ground_response(omega, speed=0.0)
     blocks = [model.channels.index(Channel(block.name, '', 'x')) for block in model.foundations]
@@ -79,3 +90,47 @@ def test_points_on_the_ground_move_with_it_and_with_the_blocks_beside_them():
     points = model.support.points(omega)[0] @ into + np.tile(np.eye(3), (2, 1))
     np.testing.assert_allclose(moved[0, -6:], points, rtol=1e-12)
     assert two_blocks().points == ()
+
+
+def test_table_of_moving_ground_is_the_solution_at_speeds_between(beside):
+    model, moving = beside
+    speed = np.linspace(5.0, 140.0, 23)
+    for found, exact in zip(moving.table.at(speed), model.ground_response(speed, speed=None),
+                            strict=True):
+        assert np.nanmax(np.abs(found - exact)) < 1e-5 * np.nanmax(np.abs(exact))
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(exact))
+
+
+def test_sensors_feel_the_machine_as_probes_in_their_place_do(beside):
+    model, moving = beside
+    speed = np.array([20.0, 60.0, 130.0])
+    answer = model.unbalance_response(speed, np.array([1e-3, 2e-4j]))
+    probes = answer.displacement[:, -6:].reshape(3, 2, 3)
+    np.testing.assert_allclose(moving.own(speed, answer.force), probes,
+                               rtol=1e-9, atol=1e-9 * np.abs(probes).max())
+
+
+def test_motion_without_the_machine_is_found_from_what_probes_feel_of_both(beside):
+    model, moving = beside
+    speed, motion = np.array([20.0, 60.0, 130.0]), np.array([2e-6, 1e-6j, 3e-6 - 1e-6j])
+    answer = model.unbalance_response(speed, np.array([1e-3, 2e-4j]))
+    followed, _ = model.ground_response(speed, speed=None)
+    probes = (answer.displacement + followed @ motion)[:, -6:].reshape(3, 2, 3)
+    free = moving.free(speed, probes, moving.own(speed, answer.force))
+    np.testing.assert_allclose(free, np.broadcast_to(motion, (3, 2, 3)), rtol=1e-4,
+                               atol=1e-4 * np.abs(motion).max())
+    # Beside a machine that only follows, what it does to the sensors is no small part.
+    assert np.abs(probes - motion).max() > 0.1 * np.abs(motion).max()
+    np.testing.assert_allclose(moving.parts(speed, np.tile(motion, (3, 1))).displacement,
+                               followed @ motion, rtol=1e-4, atol=1e-5 * np.abs(motion).max())
+
+
+def test_what_nobody_can_tell_is_no_number(beside):
+    model, moving = beside
+    unknown = replace(moving, around=None, unknown='no soil')
+    speed = np.array([60.0])
+    own = unknown.own(speed, model.unbalance_response(speed, np.ones(2)).force)
+    assert own.shape == (1, 2, 3)
+    assert np.isnan(own).all()
+    assert np.isnan(unknown.free(speed, np.ones((1, 2, 3), dtype=complex), own)).all()
+    assert np.isnan(moving.parts(np.array([150.0]), np.ones((1, 3))).displacement).all()

@@ -56,6 +56,25 @@ def test_contact_moves_by_its_compliance_where_it_may(soil):
     np.testing.assert_allclose(got, expected, rtol=0.02)  # as above
 
 
+@pytest.mark.parametrize('axis', range(3))
+def test_ground_that_moves_carries_and_shakes_as_over_frequency(axis):
+    """Relative to the ground all that has mass feels -m a: no transmissibility is in it."""
+    speed, step = 200.0, 1e-3
+    time = np.arange(0.0, 6.0, step)
+    ground = np.zeros((len(time), 3))
+    ground[:, axis] = np.cos(speed * time) * np.minimum(time, 1.0)
+    turning = np.full(len(time), speed)
+    shaken = shake(MACHINE, time, turning, moment=np.zeros((len(time), 2)), phase=np.zeros(2),
+                   ground=ground)
+    late = time > 4.0
+    track = SpeedTrack(time, turning, angle=shaken.angle)
+    got = -speed**2 * np.array([demodulate(time[late], column[late], track).displacement[0]
+                                for column in shaken.acceleration.T])
+    ratio, _ = MACHINE.ground_response(np.array([speed]), speed=speed)
+    expected = ratio[0, [MACHINE.channels.index(name) for name in shaken.channels], axis]
+    np.testing.assert_allclose(got, expected, rtol=0.02, atol=0.02 * np.abs(ratio).max())
+
+
 def test_run_up_shows_the_force_of_the_speeding_rotor():
     # Slow enough for the steady response to hold within the tolerance.
     time = np.arange(0.0, 20.0, 1e-3)

@@ -2,6 +2,7 @@
 
 from rotorsoil_ros.case.cache import Cache
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.design.sensing import unknown_beside
 from rotorsoil_ros.case.design.tables import (
     boundary_element_model,
     green_model,
@@ -10,12 +11,13 @@ from rotorsoil_ros.case.design.tables import (
     layered_site_model,
     thin_layer_model,
 )
+from rotorsoil_ros.case.entries.sensors import site_around
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.flexible.ground import bed_of, discs
-from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.bed import PatchesApart, WinklerBed
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
-from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
+from rotorsoil_ros.ground.boundary.model import BoundaryElementModel, SiteGround
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.embedded_cone import EmbeddedConeModel
@@ -82,6 +84,26 @@ def _below(case: Case, index: int, contact: Contact, cache: Cache) -> SoilModel:
         return boundary_element_model(case.soil, alone, cache=cache, speed_range=case.speed_range)
     return infinite_element_model(case.soil, contact, case.support.geometry, cache=cache,
                                   speed_range=case.speed_range)
+
+
+def around(case: Case, cache: Cache) -> SiteGround:
+    """
+    Return the ground that the blocks of a case load, its sensors as points beside them.
+
+    By boundary elements, whichever model is below the blocks: a circle is a square as large.
+
+    Raises
+    ------
+    RotorSoilError
+        If nobody can tell how the ground moves there, with the reason.
+
+    """
+    if (why := unknown_beside(case)) or case.soil is None:
+        raise RotorSoilError(why)
+    site = site_around(case.foundations, [(one.x, one.y) for one in case.sensors.ground])
+    if case.ground is not None:
+        return layered_site_model(case.ground, site, cache=cache, speed_range=case.speed_range)
+    return boundary_element_model(case.soil, site, cache=cache, speed_range=case.speed_range)
 
 
 def identity(model: SoilModel) -> object:

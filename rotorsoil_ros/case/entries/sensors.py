@@ -1,4 +1,4 @@
-"""What a case says of the accelerometers on the machine: of all of them, and of some."""
+"""What a case says of the accelerometers on the machine and on the ground beside it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,8 +6,12 @@ import difflib
 import math
 
 from rotorsoil_ros.case.case_errors import Faults
-from rotorsoil_ros.case.schema import PickupEntry
+from rotorsoil_ros.case.schema import GroundSensorEntry, PickupEntry
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import require, RotorSoilError
+from rotorsoil_ros.ground.boundary.site import Site
+from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
+from rotorsoil_ros.machine.foundation import Foundation
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +65,51 @@ class Pickup:
 
 
 @dataclass(frozen=True, slots=True)
+class GroundSensor:
+    """
+    Accelerometer of three axes on the ground.
+
+    Attributes
+    ----------
+    name : str
+        First part of its channels.
+    x, y : float
+        Where it stands, in the axes of the blocks [m].
+    of : str
+        Name of the block below which the ground is taken to move as here; empty without any.
+    pickup : Pickup
+        What is known of it; its axes are those of the blocks, z up.
+
+    """
+
+    name: str
+    x: float
+    y: float
+    of: str
+    pickup: Pickup
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Its motions along x, y, z."""
+        return tuple(Channel(self.name, '', axis) for axis in DOFS[:3])
+
+
+@dataclass(frozen=True, slots=True)
 class Sensors:
-    """All accelerometers of a machine: what holds for every one, and those that differ."""
+    """All accelerometers: what holds for those on the machine, who differs, and the ground's."""
 
     usual: Pickup = Pickup()
     others: Mapping[str, Pickup] = field(default_factory=dict)
+    ground: tuple[GroundSensor, ...] = ()
 
     def of(self, channel: str) -> Pickup:
         """Return what is known of the accelerometer of a channel."""
         return self.others.get(channel, self.usual)
 
 
-def sensors_of(faults: Faults, channels: Sequence[str]) -> Sensors | None:
+def sensors_of(
+    faults: Faults, channels: Sequence[str], foundations: Sequence[Foundation],
+) -> Sensors | None:
     """Return what a document says of the accelerometers at channels, or None where it is wrong."""
     entry, is_upright = faults.entries.sensors, faults.entries.rotor.orientation == 'vertical'
     said = entry.model_dump(exclude={'channels'}, exclude_none=True)
@@ -96,6 +133,67 @@ def sensors_of(faults: Faults, channels: Sequence[str]) -> Sensors | None:
 
     found = faults.attempt(usual)
     others = faults.attempt_each(other, entry.channels)
-    if found is None or others is None:
+    ground = _on_ground(faults, foundations)
+    if found is None or others is None or ground is None:
         return None
-    return Sensors(found, dict(zip(entry.channels, others, strict=True)))
+    return Sensors(found, dict(zip(entry.channels, others, strict=True)), ground)
+
+
+def _on_ground(
+    faults: Faults, foundations: Sequence[Foundation],
+) -> tuple[GroundSensor, ...] | None:
+    """Return the sensors on the ground, or None where one is at fault."""
+    entries = faults.entries.ground
+    blocks = {block.name: block for block in foundations}
+
+    def of() -> str:
+        if entries.of is not None and entries.of not in blocks:
+            raise faults.error('ground', 'of', problem=(
+                f'must be one of the foundations, {", ".join(blocks) or "none"}, got '
+                f'{entries.of}'))
+        if entries.of is not None and not entries.sensors:
+            raise faults.error('ground', 'of', problem=(
+                f'belongs to ground.sensors, of which there are none, got {entries.of}'))
+        return entries.of or ''
+
+    def sensor(index: int, entry: GroundSensorEntry) -> GroundSensor:
+        with faults.at('ground', 'sensors', index, entry=entry):
+            if entry.stamps is not None:
+                raise RotorSoilError(f'stamps must not be {entry.stamps} of a sensor on the '
+                                     'ground, whose phase is needed')
+            x, y = entry.place.x, entry.place.y
+            for block in foundations:
+                site_around([block], [(x, y)])
+            nearest = min(foundations, default=None, key=lambda block: math.dist(
+                (x, y), (block.centre_x, block.centre_y)))
+            said = entry if entry.anti_alias is not None else entry.model_copy(
+                update={'anti_alias': faults.entries.anti_alias})
+            return GroundSensor(entry.name, x, y, entries.of or (
+                '' if nearest is None else nearest.name), Pickup.of(said, is_upright=False))
+
+    chosen, found = faults.attempt(of), faults.attempt_each(sensor, entries.sensors)
+    return None if chosen is None else found
+
+
+def site_around(
+    foundations: Sequence[Foundation], places: Sequence[tuple[float, float]],
+) -> Site:
+    """
+    Return blocks on the ground and places beside them; a circle as a square of its area.
+
+    Raises
+    ------
+    RotorSoilError
+        If a place is not beside the blocks, or blocks overlap.
+
+    """
+    return Site.of(tuple(_with_corners(block.contact) for block in foundations),
+                   tuple((block.centre_x, block.centre_y) for block in foundations),
+                   tuple(places))
+
+
+def _with_corners(contact: Contact) -> Contact:
+    if not isinstance(contact, Circle):
+        return contact
+    half = 0.5 * math.sqrt(contact.area)
+    return Rectangle(half, half)

@@ -129,7 +129,7 @@ class PlantEntries:
                                 [RigidSoil() for _ in own.foundations], couples=couples)
         on_ground = [Channel(probe.name, '', axis)
                      for probe in own.ground_probes for axis in DOFS[:3]]
-        sensors = sensors_of(faults, [*model.channels, *on_ground])
+        sensors = sensors_of(faults, [*model.channels, *on_ground], own.foundations)
         return None if sensors is None else replace(
             own, name=name, rotor=rotors[index], couples=couples, berth=berth,
             journals=tuple(replace(journal, name=f'{name}_{journal.name}')

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.events import Profile
 from rotorsoil_ros.machine.transient.poles import Poles
 from rotorsoil_ros.machine.transient.state import Transient
 from rotorsoil_ros.monitor.comparison import Run
 from rotorsoil_ros.monitor.identification.case import identify_vectors, Wanted
 from rotorsoil_ros.monitor.identification.passing import Passing
 from rotorsoil_ros.monitor.identification.used import UsedVectors
+from rotorsoil_ros.profile import Profile
 from rotorsoil_ros.units import rpm_to_rad_s
 
 KIT = Path('config/rk4_rotor_kit.yaml')
