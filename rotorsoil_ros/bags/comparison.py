@@ -14,8 +14,10 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.zone_limits import ZoneLimits
 from rotorsoil_ros.errors import InputError
+from rotorsoil_ros.machine.transmissibility import MovingGround
 from rotorsoil_ros.monitor.comparison import Comparison, Run
 from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.ground.findings import GroundCollector
 from rotorsoil_ros.monitor.health import REDATED
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.monitor.oil import Oils
@@ -102,8 +104,9 @@ def compare(
         case = replace(case, uncertainty=replace(
             case.uncertainty, shear_modulus_factor=wish.soil_factor))
     expectation = Expectation.of(case, cache.directory(cache_directory))
-    oils = Machine(case, cache.directory(cache_directory)).oils
-    reading = _Reading(inputs, expectation, oils, wish, descriptions, progress)
+    machine = Machine(case, cache.directory(cache_directory))
+    reading = _Reading(inputs, expectation, machine.oils, machine.ground, wish, descriptions,
+                       progress)
     found, hindsight = reading.read({})
     if hindsight:  # a slow roll that comes late is the runout of what was before it, too
         found, _ = reading.read(hindsight)
@@ -117,6 +120,7 @@ class _Reading:
     inputs: Inputs
     expectation: Expectation
     oils: Oils
+    ground: MovingGround | None
     wish: Wish
     descriptions: Descriptions
     progress: Progress | None
@@ -127,10 +131,12 @@ class _Reading:
         rules = Rules(matching=self.wish.matching, amplitude_margin=self.wish.amplitude_margin,
                       zones=self.wish.zones or expectation.case.zones)
         collector, unbalances = Collector(), [(0, expectation.case.unbalance)]
+        heard = GroundCollector()
         monitor = Monitor(
-            machine, expectation.table, expectation.case.unbalance, sinks=[collector],
+            machine, expectation.table, expectation.case.unbalance,
+            sinks=[collector, heard],
             judging=Judging(rules, self.wish.turns, sensors=expectation.case.sensors),
-            hindsight=hindsight, oils=self.oils)
+            hindsight=hindsight, oils=self.oils, ground=self.ground)
         monitor.judge.take_criteria(expectation.criteria(expectation.case.unbalance))
 
         def take(stamp_ns: int, description: Mapping[str, Any]) -> None:
@@ -147,8 +153,10 @@ class _Reading:
                 self.progress(done, self.inputs.number)
         judge, run = monitor.judge, self._run(monitor, collector, unbalances)
         late = judge.runout.first if judge.runout.was_missed else {}
-        return Comparison(run, expectation, judge.account, judge.runout,
-                          collector.points()), late
+        points = collector.points()
+        return Comparison(
+            run, expectation, judge.account, judge.runout, points,
+            None if monitor.ground is None else heard.findings(monitor.ground, points)), late
 
     def _run(
         self, monitor: Monitor, collector: Collector, unbalances: list[tuple[int, ComplexArray]],

@@ -102,9 +102,10 @@ class Inputs:
             raise InputError(f'{bag}: {error}') from error
         found, speed = _of_joint(found, machine or like, of, speed)
         namespace, name = _chosen(bag, found, machine, like, missed, candidates(sources))
+        beside = _ground_of(found.values(), namespace, name)
         return cls(bag, namespace, name, {
             topic: each for topic, each in found.items()
-            if (each.place.namespace, each.place.machine) == (namespace, name)
+            if each.place.below in (f'{namespace}/{name}', beside if each.tells_ground else None)
             or _is_nobodys(each)}, speed,
             tuple(source.topic for source in sources
                   if is_model(source.topic, source.type)
@@ -163,7 +164,8 @@ def _chosen(
     speaking = {(each.place.namespace, each.place.machine) for each in told}
     if any(map(_is_nobodys, told)):  # such a speed is of whom the measurements are, or is asked
         speaking = {(each.place.namespace, each.place.machine) for each in found.values()
-                    if not each.tells_speed and each.number} or {('', machine or like)}
+                    if not (each.tells_speed or each.tells_ground) and each.number} or {
+                        ('', machine or like)}
     wanted = machine or (like if len(speaking) > 1 else '')
     chosen = {each for each in speaking if not wanted or is_called(each[1], wanted)}
     if len(chosen) == 1:
@@ -205,6 +207,19 @@ def _of_joint(
     own = replace(told.place, machine=f'{told.place.machine}/{name}')
     return {**found, topic: replace(told, place=own)}, (
         speed if speed.joint != ROTOR_JOINT else replace(speed, joint=name))
+
+
+def _ground_of(found: Iterable[Input], namespace: str, name: str) -> str:
+    """Return below which name sensors on the ground of a machine are: its own or its plant's."""
+    places = {each.place.below for each in found if each.tells_ground}
+    own = f'{namespace}/{name}'
+    for below in (own, own.rpartition('/')[0]):
+        if below in places:
+            return below
+    # A plant whose machines have no name in common: the only one that is told of.
+    speaking = {each.place.below for each in found if not each.tells_ground}
+    others = places - speaking
+    return others.pop() if len(others) == 1 else ''
 
 
 def _is_nobodys(each: Input) -> bool:

@@ -189,7 +189,8 @@ def predict(
         heard = [listener] if listener is not None else []
         monitor = Monitor(name, machine.table, unbalance,
                           sinks=[*told, largest, *viewer, *heard],
-                          judging=Judging.of(machine.case), oils=machine.oils)
+                          judging=Judging.of(machine.case), oils=machine.oils,
+                          ground=machine.ground)
         expected = criteria(machine.case, machine.model, unbalance, machine.directory)
         monitor.judge.take_criteria(expected)
         for each in heard:

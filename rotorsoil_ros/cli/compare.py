@@ -14,6 +14,7 @@ from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.figures.report import (
     channel_table,
     exclusions,
+    ground_tables,
     peak_table,
     PLANT_SCALE,
     Scale,
@@ -102,7 +103,8 @@ def _identification(
 
 def _print(comparison: Comparison, scale: Scale) -> None:
     for header, lines in (channel_table(comparison, scale), peak_table(comparison, scale),
-                          zone_table(comparison, scale)):
+                          zone_table(comparison, scale),
+                          *ground_tables(comparison, scale)):
         if lines:
             widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
             for line in (header, *lines):

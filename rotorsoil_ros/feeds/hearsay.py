@@ -13,7 +13,7 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.verdict import VIBRATION
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, STRING
-from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, NODE_NAME, OWN_TOPICS
+from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, NODE_NAME, own_name, OWN_TOPICS
 from rotorsoil_ros.wire.sensors import JointStateReader
 
 # Topics of a machine that a feed hears: which quantity each tells, and in which of its fields.
@@ -42,9 +42,7 @@ class Speaker:
     @classmethod
     def of(cls, topic: str) -> tuple['Speaker', str] | None:
         """Return who speaks on a topic of ours, and which topic it is; None of any other."""
-        # Of `steady/amplitude` and `amplitude` the longer name is meant.
-        name = max((name for name in OWN_TOPICS if topic.endswith(f'/{name}')), key=len,
-                   default='')
+        name = own_name(topic)
         path = topic.removesuffix(f'/{name}').strip('/').split('/')
         node = path.index(NODE_NAME) + 1 if NODE_NAME in path[:-1] else len(path) - 1
         is_heard = name in HEARD and node > 0 and path[-1]

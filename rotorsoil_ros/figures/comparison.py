@@ -11,6 +11,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.figures.ground import ground_document, ground_figure
 from rotorsoil_ros.figures.response import COLOURS, legend_below
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.monitor.comparison import Comparison
@@ -46,6 +47,9 @@ def all_figures(comparison: Comparison) -> Iterator[tuple[str, str, Figure]]:
     if comparison.points:  # everything measured may have been refused
         yield 'trend', 'Trend', trend(comparison)
         yield 'residuals', 'Measured less predicted vectors', residuals(comparison)
+    if comparison.ground is not None and comparison.ground.shares:
+        yield ('ground', 'What the ground does, and what is left without it',
+               ground_figure(comparison, comparison.ground))
 
 
 def _label(points: ChannelPoints) -> str:
@@ -294,17 +298,20 @@ def residuals(comparison: Comparison) -> Figure:
 
 HEADER = ('stamp_ns', 'channel', 'speed_rad_s', 'measured_amplitude', 'measured_phase_rad',
           'predicted_amplitude', 'predicted_phase_rad', 'band_low', 'band_high',
-          'band_behind_rad', 'band_ahead_rad', 'residual_amplitude', 'used', 'reason')
+          'band_behind_rad', 'band_ahead_rad', 'residual_amplitude', 'ground_amplitude',
+          'ground_phase_rad', 'used', 'reason')
 
 
 def rows(comparison: Comparison) -> Iterator[tuple[str, ...]]:
     """Yield one row per measured point, in SI units; empty where there is no number."""
+    parts = {} if comparison.ground is None else comparison.ground.parts
     for points in comparison.points:
         residual = np.abs(points.measured - points.predicted)
+        ground = parts.get(points.channel, np.full(len(residual), complex(math.nan, math.nan)))
         numbers = np.stack([
             points.speed, points.amplitude, points.phase, np.abs(points.predicted),
             np.angle(points.predicted), points.low, points.high, points.behind,
-            points.ahead, residual], axis=1)
+            points.ahead, residual, np.abs(ground), np.angle(ground)], axis=1)
         for stamp, values, reason in zip(
                 points.stamp_ns.tolist(), numbers.tolist(), points.reason, strict=True):
             yield (str(stamp), points.channel,
@@ -348,6 +355,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
             'velocity_rms_m_s': entry.velocity, 'zone': entry.zone, 'support': entry.support,
             'limits_m_s': list(entry.limits), 'constant_speed': entry.is_steady,
         } for entry in comparison.zones],
+        'ground': None if comparison.ground is None else ground_document(comparison.ground),
     }
     plain: dict[str, Any] = _without_nan(content)
     return plain

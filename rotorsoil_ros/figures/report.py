@@ -171,6 +171,9 @@ def page(
         parts += [f'<h2>Zones, {escape(comparison.rules.zones.label)}</h2>',
                   '<p>Velocity of the 1X vector alone, a lower bound of the broadband value.</p>',
                   html.table(*zone_table(comparison))]
+    if of_ground := ground_tables(comparison):
+        parts += ['<h2>Ground that moves by itself</h2>',
+                  *(html.table(*one) for one in of_ground)]
     if identification:
         text = escape('\n'.join(identification))
         parts += ['<h2>Identification</h2>', f'<pre>{text}</pre>']
@@ -241,6 +244,30 @@ def zone_table(
              ' / '.join(f'{scale.velocity * limit:g}' for limit in entry.limits),
              'yes' if entry.is_steady else 'no'] for entry in comparison.zones]
     return header, rows
+
+
+def ground_tables(
+    comparison: Comparison, scale: Scale = PLANT_SCALE,
+) -> list[tuple[list[str], list[list[str]]]]:
+    """Return header and rows of what the ground did once per turn, and of all else."""
+    if (found := comparison.ground) is None:
+        return []
+    without = {entry.channel: entry.zone for entry in found.zones}
+    velocity, length = f'[{scale.velocity_unit} rms]', f'[{scale.length_unit}]'
+    once = (['channel', 'vectors', f'from the ground {velocity}', 'of the measured [%]',
+             f'residual {length}', f'without the ground {length}', f'scatter {length}',
+             f'without the ground {length}', 'zone without the ground'],
+            [[one.channel, str(one.vectors), _number(scale.velocity * one.part),
+              _number(100.0 * one.share), *(_number(scale.length * value) for value in (
+                  one.residual, one.residual_less, one.scatter, one.scatter_less)),
+              without.get(one.channel, '-')] for one in found.shares])
+    of_all = (['channel', 'sensor', 'orders left out, band [Hz]', f'measured {velocity}',
+               f'from the ground {velocity}', f'coherent with it {velocity}', 'says'],
+              [[one.channel, one.sensor, f'{one.band[0]:.3g} to {one.band[1]:.3g}',
+                *(_number(scale.velocity * value) for value in (
+                    one.measured, one.ground, one.coherent)), one.said]
+               for one in found.broadband])
+    return [table for table in (once, of_all) if table[1]]
 
 
 def exclusions(comparison: Comparison) -> list[str]:

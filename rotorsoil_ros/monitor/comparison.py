@@ -9,6 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.monitor.criteria import Expectation
+from rotorsoil_ros.monitor.ground.findings import GroundFindings
 from rotorsoil_ros.monitor.passage import PeakPair
 from rotorsoil_ros.monitor.points import ChannelPoints, Statistics, statistics
 from rotorsoil_ros.monitor.rules import Rules
@@ -73,6 +74,8 @@ class Comparison:
         What was subtracted.
     points : list of ChannelPoints
         One for each measured channel.
+    ground : GroundFindings or None
+        What sensors on the ground say; None of a case without any.
 
     """
 
@@ -81,6 +84,7 @@ class Comparison:
     account: Account
     runout: Runout
     points: list[ChannelPoints]
+    ground: GroundFindings | None = None
 
     @property
     def rules(self) -> Rules:
@@ -116,7 +120,9 @@ class Comparison:
     @cached_property
     def remarks(self) -> list[str]:
         """What else a reader should know."""
-        return [*self.run.notes, *self._of_the_case(), *self._of_channels(), *self._of_peaks()]
+        ground = [] if self.ground is None else self.ground.remarks
+        return [*self.run.notes, *self._of_the_case(), *ground, *self._of_channels(),
+                *self._of_peaks()]
 
     def _of_the_case(self) -> Iterator[str]:
         if said := self.account.suspicion.said:

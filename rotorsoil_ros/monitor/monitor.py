@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+import math
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from rotorsoil_ros.events import (
 )
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.machine.transient.state import Transient
+from rotorsoil_ros.machine.transmissibility import MovingGround
+from rotorsoil_ros.monitor.ground.attribution import Attribution
 from rotorsoil_ros.monitor.health import Health, STANDING, STANDSTILL
 from rotorsoil_ros.monitor.judge import Judge
 from rotorsoil_ros.monitor.oil import Oils, OilTables
@@ -46,6 +49,7 @@ class Monitor:
         self, machine: str, table: ResponseTable, unbalance: ComplexArray, *,
         sinks: Sequence[Sink], judging: Judging | None = None,
         hindsight: Mapping[str, complex] | None = None, oils: Oils | None = None,
+        ground: MovingGround | None = None,
     ) -> None:
         self.machine = machine
         self.table = table
@@ -56,6 +60,13 @@ class Monitor:
         self._predictor, self._transient = table.predictor(unbalance), Transient(table.poles)
         self.judge = Judge(machine, self._predictor, judging or Judging(),
                            transient=self._transient, hindsight=hindsight)
+        self._listen(ground, judging)
+
+    def _listen(self, ground: MovingGround | None, judging: Judging | None) -> None:
+        """Hear sensors on the ground, where there are any."""
+        self.ground = None if ground is None else Attribution(
+            self.machine, ground, judging or Judging(), self.judge.history,
+            self.judge.account.zones)
 
     def set_unbalance(self, unbalance: ComplexArray) -> None:
         """Use another unbalance, (planes,) [kg m], from the next speed on."""
@@ -89,6 +100,7 @@ class Monitor:
     def take_table(
         self, table: ResponseTable, unbalance: ComplexArray, *, sinks: Sequence[Sink],
         judging: Judging | None = None, oils: Oils | None = None,
+        ground: MovingGround | None = None,
     ) -> None:
         """Answer from another table and judge by other rules, from the next speed on."""
         self._unbalance, self._oils = unbalance, OilTables(oils or {})
@@ -97,6 +109,7 @@ class Monitor:
         self._predictor = table.predictor(unbalance)
         self.judge = Judge(self.machine, self._predictor, judging or Judging(),
                            transient=self._transient)
+        self._listen(ground, judging)
 
     def _stand_on(self, table: ResponseTable) -> None:
         self.table, self._transient = table, Transient(table.poles)
@@ -118,7 +131,9 @@ class Monitor:
         """Hand on what a measuring system says about this machine."""
         self.health.note('measured', len(measured.stamp_ns))
         self._emit(measured)
-        self._emit_all(self.judge.on_measured(measured))
+        of_machine = measured if self.ground is None else self.ground.take_measured(measured)
+        if of_machine is not None:
+            self._emit_all(self.judge.on_measured(of_machine))
 
     def on_samples(self, samples: Samples) -> None:
         """Hand on raw samples; the vectors that are in them are found at the next tick."""
@@ -126,6 +141,15 @@ class Monitor:
         samples = self.judge.in_si(samples)
         self._emit(samples)
         self.judge.on_samples(samples)
+        if self.ground is not None:
+            self.ground.take_housing(samples)
+
+    def on_ground(self, sensor: str, samples: Samples) -> None:
+        """Hand on raw samples of a sensor on the ground."""
+        if self.ground is not None:
+            self.health.note('samples', len(samples.stamp_ns))
+            self.judge.is_synthetic |= samples.is_synthetic
+            self.ground.take(sensor, samples)
 
     def begin(self, now_ns: int, description: Mapping[str, object]) -> None:
         """Begin to watch, and say what the predictions rest on."""
@@ -140,17 +164,31 @@ class Monitor:
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> None:
         """Report the health of the machine over the time since the last tick."""
-        found = list(self.judge.tick(now_ns, stale_after_s=stale_after_s))
-        parts = tuple(event for event in found if isinstance(event, Diagnostics))
-        self._emit_all(event for event in found if not isinstance(event, Diagnostics))
+        parts = self._told(self.judge.tick(now_ns, stale_after_s=stale_after_s))
+        if self.ground is not None:
+            parts += self._told(self.ground.tick(
+                now_ns, self._predictor, stale_after_s=stale_after_s))
         self._emit_all(Remark(self.machine, now_ns, Level.WARN, text)
                        for text in self.health.news())
         health = self.health.tick(now_ns, stale_after_s=stale_after_s)
-        self._emit(replace(health, parts=parts) if parts else health)
+        self._emit(replace(health, parts=tuple(parts)) if parts else health)
 
     def finish(self, now_ns: int) -> None:
         """Say what can only be said at the end of a run."""
-        self._emit_all(self.judge.finish(now_ns))
+        self._told(self.judge.finish(now_ns))
+        if self.ground is not None:
+            self._told(self.ground.tick(now_ns, self._predictor, stale_after_s=math.inf,
+                                        is_last=True))
+
+    def _told(self, events: Iterable[Event]) -> list[Diagnostics]:
+        """Hand events on; return the health of parts, which is told with that of the whole."""
+        parts = []
+        for event in events:
+            if isinstance(event, Diagnostics):
+                parts.append(event)
+            else:
+                self._emit_all([event])
+        return parts
 
     def _emit(self, event: Event) -> None:
         for sink in self._sinks:
@@ -158,6 +196,8 @@ class Monitor:
 
     def _emit_all(self, events: Iterable[Event]) -> None:
         for event in events:
+            if self.ground is not None:
+                self.ground.see(event)
             self._emit(event)
 
     def _predict_with_gaps(self, speed: FloatArray) -> tuple[Prediction, FloatArray]:

@@ -79,7 +79,7 @@ class Axes:
         """
         felt, quaternion = said[:, _FELT], said[:, _QUATERNION]
         self._see(felt, quaternion, seconds)
-        to_machine = _heading(self._pickup)
+        to_machine = self.to_machine
         if self._pickup.heading and not np.isfinite(felt).all():
             return Refusal(Flaw.TURNED, 'the sensor has a heading, but not every sample has three '
                                         'axes')
@@ -87,12 +87,10 @@ class Axes:
             if not np.isfinite(said).all():
                 return Refusal(Flaw.TURNED, 'the orientation is to be used, but not every sample '
                                             'has one, and three axes')
-            mean = np.linalg.eigh(self._turns)[1][:, -1]
+            mean = self._mean
             if (strays := float(np.max(_apart(quaternion, mean)))) > _STRAYS:
                 return Refusal(Flaw.TURNED, 'the orientation of the sensor strays by '
                                             f'{math.degrees(strays):.0f} deg from its mean')
-            to_machine = _matrix(mean) if not self._pickup.is_upright else (
-                _STANDING @ _matrix(mean))
             values = felt @ to_machine[self._column]
         elif (tilt := _largest_turn(quaternion)) > _TURNED:
             return Refusal(Flaw.TURNED, 'the orientation of the sensor turns its axes by '
@@ -101,6 +99,19 @@ class Axes:
             values = felt @ to_machine[self._column]
         refusal = self._against_gravity(to_machine)
         return values if refusal is None else refusal
+
+    @property
+    def to_machine(self) -> FloatArray:
+        """The matrix (3, 3) from axes of the sensor to those of the machine, as known now."""
+        if not self._pickup.has_orientation:
+            return _heading(self._pickup)
+        turned = _matrix(self._mean)
+        return _STANDING @ turned if self._pickup.is_upright else turned
+
+    @property
+    def _mean(self) -> FloatArray:
+        """Mean of what the sensor says of its orientation, a unit quaternion."""
+        return np.asarray(np.linalg.eigh(self._turns)[1][:, -1])
 
     def peaks(self, values: FloatArray, said: FloatArray) -> FloatArray:
         """Return the largest (n,) that the sensor felt along the axes that count [m/s^2]."""

@@ -68,6 +68,8 @@ class Stretch:
         How many turns make a stretch.
     pickup : Pickup
         What is known of the sensor.
+    above_noise : float
+        Multiple of its standard error below which a vector is noise.
 
     """
 
@@ -77,6 +79,7 @@ class Stretch:
     until: float
     turns: float
     pickup: Pickup
+    above_noise: float = ABOVE_NOISE
 
 
 class Finding:
@@ -154,7 +157,8 @@ class Finding:
         size = np.abs(found.vectors[:len(likely)])
         error = np.hypot(deviations(found, likely, speed=speed),
                          size * (0.5 * scatter**2 + hidden))
-        if flaw := _of_fit(found, float(size[0]), float(error[0]), speed):
+        if flaw := _of_fit(found, float(size[0]), float(error[0]), speed,
+                           self._stretch.above_noise):
             return flaw
         told = self._told(rate)
         self.left_out += ['spike left out'] * self._spikes
@@ -210,11 +214,13 @@ class Finding:
             yield np.clip(grid, begin, end)
 
 
-def _of_fit(found: OrderFit, size: float, error: float, speed: float) -> Refusal | None:
+def _of_fit(
+    found: OrderFit, size: float, error: float, speed: float, above_noise: float,
+) -> Refusal | None:
     """Return why a vector of 1X with its standard error [m] at a speed [rad/s] is none."""
     if flaw := jump(found.residual, first=size * speed**2, deviation=error * speed**2):
         return flaw
-    if size < ABOVE_NOISE * error:
-        return Refusal(Flaw.NOISE, f'below noise: less than {ABOVE_NOISE:g} times its standard '
+    if size < above_noise * error:
+        return Refusal(Flaw.NOISE, f'below noise: less than {above_noise:g} times its standard '
                                    'error')
     return None

@@ -1,0 +1,1 @@
+"""What of a measured vibration comes from ground that moves by itself."""
