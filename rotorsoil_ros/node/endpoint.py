@@ -1,6 +1,7 @@
 """One machine on the graph: its subscriptions, its monitor and its publishers."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -22,8 +23,22 @@ from rotorsoil_ros.node.together import Together
 from rotorsoil_ros.units import rad_s_to_rpm
 from rotorsoil_ros.wire.dating import Arrival
 from rotorsoil_ros.wire.definitions import IMU, STRING, TEMPERATURE
-from rotorsoil_ros.wire.handlers import Inlet, inlet, MEASURED_TOPICS, OIL_TOPIC, raw_channel
-from rotorsoil_ros.wire.messages import Encoder, Messenger, OWN_TOPICS, Records, Topics
+from rotorsoil_ros.wire.handlers import (
+    ground_sensor,
+    Inlet,
+    inlet,
+    MEASURED_TOPICS,
+    OIL_TOPIC,
+    raw_channel,
+)
+from rotorsoil_ros.wire.messages import (
+    Encoder,
+    GROUND_TOPICS,
+    Messenger,
+    OWN_TOPICS,
+    Records,
+    Topics,
+)
 from rotorsoil_ros.wire.speeds import SpeedSource
 
 RAW_DEPTH = 1000  # samples kept while the node is busy
@@ -68,11 +83,13 @@ class Watch:
         self._log, self._bench, self.plant = log, bench, plant
         self._arrival = Arrival(lambda: int(node.get_clock().now().nanoseconds))
         self._topics = self._publish(diagnostics)
+        if machine.ground is not None:
+            self._topics = replace(self._topics, **self._publish_ground())
         self._shown_channels = machine.table.channels
         self._said: set[str] = set()
         self.monitor = Monitor(name, machine.table, self._unbalance(), sinks=self._sinks(),
                                judging=settings.judging(name, machine.case),
-                               oils=machine.oils)
+                               oils=machine.oils, ground=machine.ground)
         if plant is not None:
             plant.join(self.monitor)
         self._raw_topics: dict[str, str] = {}
@@ -111,10 +128,14 @@ class Watch:
     def take_machine(self, machine: Machine) -> str:
         """Answer from another case, from the next speed on; return what to add of it."""
         self._machine = machine
+        if machine.ground is not None and not self._topics.ground_amplitude:
+            self._topics = replace(self._topics, **self._publish_ground())
+        self._look_for_ground()
         self._settings.renew_unbalance(self.name, machine)
         self.monitor.take_table(
             machine.table, self._unbalance(), sinks=self._sinks(),
-            judging=self._settings.judging(self.name, machine.case), oils=machine.oils)
+            judging=self._settings.judging(self.name, machine.case), oils=machine.oils,
+            ground=machine.ground)
         if self.is_active:
             self.monitor.describe(
                 self._node.get_clock().now().nanoseconds, self._description())
@@ -137,7 +158,7 @@ class Watch:
     def _sinks(self) -> list[Sink]:
         is_written = self._log.is_written
         steady = [publisher for name, publisher in zip(
-            OWN_TOPICS, self._own_publishers, strict=True) if name.startswith('steady/')]
+            OWN_TOPICS, self._own_publishers, strict=False) if name.startswith('steady/')]
         encoder = Encoder(
             self.name, self._machine.table.channels, self._topics, wants_steady=lambda: (
                 is_written or any(publisher.get_subscription_count() for publisher in steady)))
@@ -172,11 +193,7 @@ class Watch:
 
     def _publish(self, diagnostics: LifecyclePublisher) -> Topics:
         """Create the publishers; return the names that their topics have after remapping."""
-        self._own_publishers = [
-            self._node.create_lifecycle_publisher(
-                message_class(kind), f'~/{self.name}/{name}',
-                LATCHED if kind == STRING else OUTPUT)
-            for name, kind in OWN_TOPICS.items()]
+        self._own_publishers = self._create(OWN_TOPICS)
         # Past the lifecycle's own gate, which takes a microsecond: nothing is sent unless active.
         self._publish_on = {publisher.topic_name: partial(Publisher.publish, publisher)
                             for publisher in (*self._own_publishers, diagnostics)}
@@ -184,6 +201,20 @@ class Watch:
             {name: publisher.topic_name for name, publisher in zip(
                 OWN_TOPICS, self._own_publishers, strict=True)},
             diagnostics=diagnostics.topic_name, node=self._node.get_fully_qualified_name())
+
+    def _create(self, topics: Mapping[str, str]) -> list[LifecyclePublisher]:
+        return [self._node.create_lifecycle_publisher(
+            message_class(kind), f'~/{self.name}/{name}', LATCHED if kind == STRING else OUTPUT)
+            for name, kind in topics.items()]
+
+    def _publish_ground(self) -> dict[str, str]:
+        """Create the publishers of what ground that moves does; return their topics' names."""
+        created = self._create(GROUND_TOPICS)
+        self._own_publishers += created
+        self._publish_on |= {publisher.topic_name: partial(Publisher.publish, publisher)
+                             for publisher in created}
+        return {name.replace('/', '_'): publisher.topic_name
+                for name, publisher in zip(GROUND_TOPICS, created, strict=True)}
 
     def _subscribe(self) -> None:
         for name, kind in MEASURED_TOPICS.items():
@@ -194,16 +225,30 @@ class Watch:
             name = f'measured/{channel}/imu'
             if raw_channel(name):
                 self._raw_topics[self._node.resolve_topic_name(f'{self.name}/{name}')] = name
+        self._look_for_ground()
+
+    def _look_for_ground(self) -> None:
+        """Hear sensors on the ground, which all machines of a plant share."""
+        place = self.name if self.plant is None else self.plant.name
+        for sensor in self._machine.case.sensors.ground:
+            name = f'ground/{sensor.name}/imu'
+            topic = self._node.resolve_topic_name(f'{place}/{name}')
+            if topic not in self._numbered:
+                self._raw_topics[topic] = name
 
     def _hear_sensors(self, topics: Collection[str]) -> None:
         """Subscribe to raw samples that somebody publishes; of most channels nobody does."""
         for topic in self._raw_topics.keys() & topics:
-            self._hear(self._raw_topics.pop(topic), IMU, depth=RAW_DEPTH)
+            self._hear(self._raw_topics.pop(topic), IMU, depth=RAW_DEPTH, topic=topic)
 
-    def _hear(self, name: str, kind: str, *, depth: int) -> None:
+    def _hear(self, name: str, kind: str, *, depth: int, topic: str = '') -> None:
         """Subscribe to what is measured."""
-        topic = str(self._node.resolve_topic_name(f'{self.name}/{name}'))
-        self._take(inlet(name, topic, self.monitor, log=self._log.write), topic, kind, depth,
+        topic = topic or str(self._node.resolve_topic_name(f'{self.name}/{name}'))
+        # What several machines hear is logged once.
+        is_logged = not ground_sensor(name) or self.plant is None or (
+            next(iter(self.plant.monitors)) == self.name)
+        log = self._log.write if is_logged else _nowhere
+        self._take(inlet(name, topic, self.monitor, log=log), topic, kind, depth,
                    lost_as='measurements_dropped')
 
     def _hear_speed(
@@ -244,3 +289,7 @@ class Watch:
 
     def _description(self) -> Any:
         return self._machine.description(self.name, self._unbalance())
+
+
+def _nowhere(records: Records) -> None:
+    """Log nothing."""

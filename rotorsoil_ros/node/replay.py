@@ -120,7 +120,8 @@ class _Sent:
             missed = ''.join(f'; {miss}' for miss in near_misses(sources, speed))
             raise InputError(f'{profile}: tells no speed on joint_states or rotor/speed{missed}'
                              f'{candidates(sources)}{ADVICE}')
-        machines = {each.place.machine for each in found.values()} - {''}
+        machines = {each.place.machine for each in found.values()
+                    if not each.tells_ground} - {''}
         nobodys = not speed.is_usual and not all(each.place.machine for each in speeds)
         if nobodys and not machine and len(machines) != 1:
             raise InputError(f'{profile}: no topic says whose speed it is; name the machine '
