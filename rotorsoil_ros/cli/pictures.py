@@ -109,6 +109,10 @@ def _soil_figures(
             'cone', 'infinite_elements', BOUNDARY_ELEMENTS, THIN_LAYERS):
         return
     for index, block in enumerate(model.foundations):
+        if not block.is_solid:
+            print(f'no picture compliance_{block.name}: {case.path}: it has no contact as a whole',
+                  file=sys.stderr)
+            continue
         own = model.soil_models[index] if case.support.model == THIN_LAYERS else None
         if isinstance(own, ThinLayerModel):
             yield f'compliance_{block.name}', _layers_figure(case, block, own, directory)

@@ -42,10 +42,13 @@ def damping_figure(case: Case, model: CoupledModel) -> Figure:
     criticals = critical_speeds(model, model.bearings.within_tables(case.speed_range))
     modes = [(critical, split) for critical, split in zip(
         criticals, splitter.of_modes(criticals), strict=True) if split is not None][:_MOST_MODES]
-    figure = Figure(figsize=(8.0, 7.0), layout='constrained')
-    top, bottom = figure.subplots(2, 1, height_ratios=[1.0, 0.25 + 0.12 * max(len(modes), 1)])
+    share = 0.25 + 0.12 * len(modes) if modes else 0.0
+    figure = Figure(figsize=(8.0, 7.0 if modes else 4.5), layout='constrained')
+    top, *bottom = figure.subplots(
+        1 + bool(modes), 1, squeeze=False, height_ratios=[1.0, share][:1 + bool(modes)])[:, 0]
     _draw_forced(top, forced)
-    _draw_modes(bottom, modes)
+    for axes in bottom:  # of modes that no split is known of there is nothing to draw
+        _draw_modes(axes, modes)
     figure.suptitle(f'{case.name}: where the damping comes from', fontsize=10)
     return figure
 

@@ -324,7 +324,7 @@ def compliance_figure(
         row[0].set_ylabel(f'{DOFS[dof]} [{unit}]')
         row[2].set_ylabel('[%]', fontsize=8)
     for axes, title in zip(grid[0], ('real part', 'imaginary part',
-                                     f'off {list(models)[-1]}, |difference| / |N|'), strict=True):
+                                     f'off {list(models)[-1]},\n|difference| / |N|'), strict=True):
         axes.set_title(title, fontsize=8)
     for axes in grid[-1]:
         axes.set_xlabel('a0 [-]')
