@@ -204,8 +204,10 @@ class Scene:
         """Words and where they stand: of one machine its stations, else the machines."""
         if len(self.lines) == 1:
             [line] = self.lines
-            return [(station.name, line.named_at(station, self.extent))
-                    for station in line.stations]
+            # Every second one farther out: those of close discs would cover each other.
+            return [(station.name, line.named_at(
+                station, (1.0 + 0.8 * (number % 2)) * self.extent))
+                for number, station in enumerate(line.stations)]
         return [(line.name, line.topped(0.08 * self.extent)) for line in self.lines]
 
     @property
