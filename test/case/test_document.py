@@ -4,7 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from rotorsoil_ros.case.document import chosen, located, override, parse, read, SHIPPED
+from rotorsoil_ros.case.document import (
+    _FastLoader,
+    _loaded,
+    _Loader,
+    chosen,
+    located,
+    override,
+    parse,
+    read,
+    SHIPPED,
+)
 from rotorsoil_ros.errors import InputError
 
 
@@ -30,6 +40,23 @@ def test_every_key_at_fault_is_told():
 def test_anchors_and_merges_work():
     got = parse('a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n', source='x')
     assert got == {'a': {'x': 1, 'y': 2}, 'b': {'x': 1, 'y': 3}}
+
+
+@pytest.mark.parametrize('text', [
+    *(file.read_text(encoding='utf-8') for file in sorted(SHIPPED.glob('*.yaml'))),
+    'a: &a {x: [1, -.5, .inf, ~, on, 1:30, "é"]}\nb: {<<: *a}\nc: >-\n  two\n  lines\nb: 1\n'
+    '[d]: 2\n'])
+def test_the_fast_reader_reads_what_the_slow_one_does(text):
+    assert repr(_loaded(text, _FastLoader)) == repr(_loaded(text, _Loader))
+
+
+def test_what_is_no_yaml_is_told_in_the_words_of_the_slow_reader():
+    # libyaml takes a tab behind a colon, and has words of its own.
+    for text, words in (('a:\tb', "found character '\\t' that cannot start any token"),
+                        ('a: [1,\nb: 2', "expected ',' or ']', but got '<stream end>'")):
+        with pytest.raises(InputError) as caught:
+            parse(text, source='x')
+        assert words in str(caught.value)
 
 
 def _bomb():
