@@ -331,19 +331,18 @@ class Predictor:
         """
         if struck is None:
             return steady
-        (rows, weights), count = struck, len(self.channels)
-        # Of d and of A d real and imaginary parts, (2 k, m, 2), in the order of `strength`.
-        numbers = weights.view(float).transpose(2, 0, 1)
-        added = summed(np.ascontiguousarray(numbers).reshape(len(numbers), -1), self.strength)
-        away, changing = added.reshape(-1, 2, 2, 2, count).transpose(1, 0, 2, 3, 4)
-        parts = steady.parts.copy()
-        if len(rows) == len(parts):
-            parts += away
-            moved = parts
+        rows, count = struck.rows, len(self.channels)
+        # Real and imaginary parts in the order of `strength`, (2 k, 2 m): of all d, then of A d.
+        numbers = np.concatenate([struck.away, struck.share]).view(float).T
+        away, changing = summed(np.ascontiguousarray(numbers), self.strength).reshape(
+            2, -1, 2, 2, count)
+        if len(rows) == len(steady.speed):
+            parts = moved = steady.parts + away
+            turning = steady.speed[:, None]
         else:
-            moved = parts[rows] + away
-            parts[rows] = moved
-        velocity, turning = changing[:, :, 0], steady.speed[rows, None]
+            parts, turning = steady.parts.copy(), steady.speed[rows, None]
+            parts[rows] = moved = parts[rows] + away
+        velocity = changing[:, :, 0]
         velocity[:, 0] -= turning * moved[:, 1, 0]
         velocity[:, 1] += turning * moved[:, 0, 0]
         return Prediction.of_parts(steady.speed, parts, (rows, velocity))

@@ -146,7 +146,7 @@ def struck(decay):
 def away(transient, stamps, speed):
     """Return the share A d by which it is off its steady response, (n,)."""
     found, share = transient.follow(stamps, speed), np.zeros(len(speed), dtype=complex)
-    share[found.rows] = found.weights[:, 1, 0]
+    share[found.rows] = found.share[:, 0]
     return share
 
 

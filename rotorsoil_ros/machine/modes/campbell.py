@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import RotorSoilError, solved
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.following import assigned
 from rotorsoil_ros.machine.modes.spectrum import Spectrum, SpectrumSolver
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
@@ -116,7 +116,7 @@ def follow(found: Spectrum) -> IntArray:
         likeness = np.abs(shape[index - 1, old].conj() @ shape[index, new].T)
         before, after = found.frequency[index - 1, old, None], found.frequency[index, new]
         gap = np.abs(after - before) / np.abs(after + before)
-        ends, starts = linear_sum_assignment(gap - likeness)
+        ends, starts = assigned(gap - likeness)
         alike = (likeness - gap)[ends, starts] > _ALIKE
         branch[index, new[starts[alike]]] = branch[index - 1, old[ends[alike]]]
         fresh = new[branch[index, new] < 0]

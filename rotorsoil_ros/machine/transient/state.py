@@ -27,6 +27,7 @@ _NOTHING = 1e-6
 _PAST, _PAST_NS = 1 << 14, 100_000_000_000
 
 _NANOSECOND = 1e-9
+_FIRST = np.zeros(1, dtype=np.int64)
 _ROOT_PI = math.sqrt(math.pi)
 
 
@@ -38,13 +39,14 @@ class Struck(NamedTuple):
     ----------
     rows : (m,) int array
         Which of them.
-    weights : (m, 2, k) complex array
+    away, share : (m, k) complex arrays
         Of all vibrations d = v + 1 / A [s] and A d [-].
 
     """
 
     rows: IntArray
-    weights: ComplexArray
+    away: ComplexArray
+    share: ComplexArray
 
 
 def step(
@@ -172,14 +174,19 @@ class Transient:
         """
         if not len(self.turns):
             return None
-        if len(speed) == 1:  # message by message
-            value = speed.item()
-            return self._struck([0], speed, [self._take(stamp_ns.item(), value)] if (
-                math.isfinite(value)) else [None])
+        if len(speed) == 1:
+            return self._follow_one(stamp_ns.item(), speed.item())
         answered = np.flatnonzero(np.isfinite(speed))
         stamps, told = stamp_ns[answered], speed[answered]
         return self._struck(answered.tolist(), told, list(map(
             self._take, stamps.tolist(), told.tolist(), self._ways(stamps, told))))
+
+    def _follow_one(self, stamp: int, speed: float) -> Struck | None:
+        """Follow message by message: the same as many, with less ado."""
+        if not math.isfinite(speed) or (envelope := self._take(stamp, speed)) is None:
+            return None
+        away, share, left = _deviations(envelope[None], self._rate_of(speed)[None])
+        return Struck(_FIRST, away, share) if left[0] else None
 
     def at(self, stamp_ns: IntArray, speed: FloatArray) -> Struck | None:
         """
@@ -233,7 +240,8 @@ class Transient:
             rests = True
         else:
             envelopes = self._stepped(self._now, stamp, speed, way)
-            if speed == last_speed and not _is_left(1.0 + envelopes * self._rate_of(speed)):
+            if speed == last_speed and (
+                    _largest(1.0 + envelopes * self._rate_of(speed)) < _NOTHING):
                 envelopes = None
         self._now = stamp, speed, envelopes
         if rests and self._rests:
@@ -271,19 +279,25 @@ class Transient:
         known = [row for row, each in enumerate(envelopes) if each is not None]
         if not known:
             return None
-        rate = self._rate_of(speed.item())[None] if len(speed) == 1 else self.rate(speed[known])
-        weights = np.empty((len(known), 2, len(self.turns)), dtype=complex)
-        # Of the same shape: of what is broadcast numpy rounds a product in another way.
-        share = np.concatenate([envelopes[row] for row in known]).reshape(rate.shape) * rate
-        share += 1.0
-        np.divide(share, rate, out=weights[:, 0])
-        weights[:, 1] = share
-        left = _is_left(share)
-        if np.count_nonzero(left) == len(left):
-            return Struck(np.array(rows)[known], weights)
-        return Struck(np.array(rows)[known][left], weights[left]) if left.any() else None
+        rate = self.rate(speed[known])
+        envelope = np.concatenate([envelopes[row] for row in known]).reshape(rate.shape)
+        away, share, left = _deviations(envelope, rate)
+        at = np.array(rows)[known]
+        if left.all():
+            return Struck(at, away, share)
+        return Struck(at[left], away[left], share[left]) if left.any() else None
 
 
-def _is_left(share: ComplexArray) -> BoolArray:
-    """Return whether anything is left of a vibration, (...) of shares A d (..., k)."""
-    return np.asarray(np.abs(share.view(float)).max(axis=-1) >= _NOTHING)
+def _deviations(
+    envelope: ComplexArray, rate: ComplexArray,
+) -> tuple[ComplexArray, ComplexArray, BoolArray]:
+    """Return d and A d = 1 + A v (m, k) each, and whether anything is left of them, (m,)."""
+    # Of the same shape: of what is broadcast numpy rounds a product in another way.
+    share = envelope * rate
+    share += 1.0
+    return share / rate, share, _largest(share) >= _NOTHING
+
+
+def _largest(share: ComplexArray) -> FloatArray:
+    """Return the largest part of a share, (...) of (..., k)."""
+    return np.asarray(np.abs(share.view(float)).max(axis=-1))

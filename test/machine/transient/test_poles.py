@@ -197,8 +197,8 @@ def test_all_channels_and_forces_share_the_poles(name, request):
             whole = predictor.predict(near)
             # Minus the steady response of every pole, -1 / A.
             rate = (1.0 - table.poles.slope) * (table.poles.decay - 1j * near[:, None])
-            rest = predictor.moved(whole, Struck(np.arange(len(near)), np.stack(
-                [1.0 / rate, np.ones(rate.shape)], axis=1)))
+            rest = predictor.moved(whole, Struck(
+                np.arange(len(near)), 1.0 / rate, np.ones(rate.shape, dtype=complex)))
             for part in ('displacement', 'force'):
                 smooth, size = getattr(rest, part), np.abs(getattr(whole, part))
                 given = np.isfinite(smooth).all(axis=0)

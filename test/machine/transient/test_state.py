@@ -36,7 +36,7 @@ def told(transient, stamp_ns, speed):
 def all_rows(struck, count, poles):
     found = np.zeros((count, 2, poles), dtype=complex)
     if struck is not None:
-        found[struck.rows] = struck.weights
+        found[struck.rows, 0], found[struck.rows, 1] = struck.away, struck.share
     return found
 
 
@@ -207,7 +207,7 @@ def test_past_times_are_told_between_the_speeds():
     rows = np.array([3, 77, 901])
     found = transient.at(fine_ns[rows], 95.0 + 2.0 * fine_ns[rows] / SECOND)
     np.testing.assert_array_equal(found.rows, np.arange(3))
-    np.testing.assert_allclose(found.weights[:, 0], fine[rows, 0], rtol=1e-7)
+    np.testing.assert_allclose(found.away, fine[rows, 0], rtol=1e-7)
     unknown = np.array([-1, stamp_ns[-1] + 11 * SECOND, fine_ns[3]])
     assert transient.at(unknown, np.array([95.0, 99.0, math.nan])) is None
 
