@@ -8,6 +8,7 @@ import numpy as np
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.ground.boundary.model import SiteGround
+from rotorsoil_ros.machine.bearings import Bearings
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.pieces import Pieces, refine
 from rotorsoil_ros.machine.response import TOLERANCE
@@ -146,8 +147,7 @@ class GroundTable:
             wanted = at(speed, None)
             return wanted, wanted[:, :0]
 
-        low, high = model.support.known(_HIGHEST_ORDER * speed_range[1])
-        omega = np.linspace(max(low, high / _BESIDE), high, _BESIDE)
+        omega = _beside_the_speed(model, _HIGHEST_ORDER * speed_range[1])
         return cls(model.channels, model.transmits_force, refine(
             solve, np.linspace(*speed_range, _FIRST_PIECES + 1), groups=model.groups,
             tolerance=TOLERANCE, columns=len(ALONG), floor=_NOTHING), omega, at(omega, rated))
@@ -181,6 +181,16 @@ class GroundTable:
         return cls(channels, arrays['transmits_force'], Pieces(
             arrays['edges'], arrays['resolved'], arrays['coefficients']), arrays['omega'],
             arrays['beside'])
+
+
+def _beside_the_speed(model: CoupledModel, highest: float) -> FloatArray:
+    """Return frequencies [rad/s] of which ground and bearings tell, up to a highest one."""
+    low, high = model.support.known(highest)
+    for rotor in model.rotors:
+        first, last = Bearings(rotor.bearings).frequency_range
+        low, high = max(low, first), min(high, last)
+    low = max(low, high / _BESIDE)
+    return np.linspace(low, high, _BESIDE if low < high else 0)
 
 
 @dataclass(frozen=True)

@@ -155,7 +155,8 @@ class Attribution:
         last_ns = min(self._history.last_ns, *(one.last_ns for one in heard))
         second = (last_ns - reach) // NANOSECONDS
         begin_ns = max(one.first_ns for one in heard) + reach
-        if second > self._second and second * NANOSECONDS >= begin_ns:
+        # Another one, not a later one: stamps may go back.
+        if second != self._second and second * NANOSECONDS >= begin_ns:
             self._second, stamp = second, second * NANOSECONDS
             self._want(stamp, self._history.speed_near(stamp, tolerance_ns=NANOSECONDS))
 

@@ -32,8 +32,8 @@ _ORDERS, _BINS, _SLIP = 10, 2, 0.03
 # A hole of more samples than this is no stretch, and neither is less than this share of one.
 _LONGEST_HOLE, _LEAST = 4, 0.9
 
-# Below this coherence it is not the ground; with fewer averages it is chance.
-LEAST_COHERENCE, FEWEST_AVERAGES = 0.3, 10
+# Below this coherence it is not the ground; chance gives 0.1 to the average of one stretch.
+LEAST_COHERENCE = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,6 @@ class Broadband:
     @property
     def said(self) -> str:
         """In words what the coherence says of the ground's part."""
-        if self.averages < FEWEST_AVERAGES:
-            return f'too short to tell: {self.averages} averages'
         if self.coherence < LEAST_COHERENCE:
             return f'not the ground: coherence {self.coherence:.2f}'
         return f'coherence {self.coherence:.2f}'
@@ -115,9 +113,11 @@ class Spectra:
         self._channels: dict[str, Channel] = {}
         self._lowest_hz = _LOWEST_HZ
         self._looked, self._rows = 0, list[Broadband]()
+        self._begin_ns = 0
 
     def take_ground(self, sensor: str, stamp_ns: IntArray, felt: FloatArray) -> None:
         """Keep samples of a sensor, (n, 3) [m/s^2]."""
+        self._begin_ns = self._begin_ns or int(stamp_ns[0])
         self._parts.setdefault(sensor, []).append((stamp_ns, felt))
 
     def take(self, channel: Channel, stamp_ns: IntArray, acceleration: FloatArray) -> None:
@@ -132,9 +132,9 @@ class Spectra:
         if not heard or not self._channels:
             self._parts = {key: parts[-1:] for key, parts in self._parts.items()}
             return
-        while len(self._parts) > 1:
-            first = min(int(parts[0][0][0]) for parts in self._parts.values()) // _STRETCH_NS
-            ends = sorted(int(parts[-1][0][-1]) // _STRETCH_NS for parts in self._parts.values())
+        while self._parts:
+            first = min(self._index(parts[0][0][0]) for parts in self._parts.values())
+            ends = sorted(self._index(parts[-1][0][-1]) for parts in self._parts.values())
             # Who is a whole stretch behind all others is not waited for.
             if not (is_last or ends[0] > first or ends[-1] > first + 1):
                 return
@@ -142,9 +142,14 @@ class Spectra:
             if is_last and first >= ends[-1]:
                 return
 
+    def _index(self, stamp: int) -> int:
+        """Return in which stretch a stamp lies, counted from the first sample of the ground."""
+        return (int(stamp) - self._begin_ns) // _STRETCH_NS
+
     def _look(self, index: int) -> None:
         """Add a stretch to the sums, and let its samples go."""
-        begin, end = index * _STRETCH_NS, (index + 1) * _STRETCH_NS
+        begin = self._begin_ns + index * _STRETCH_NS
+        end = begin + _STRETCH_NS
         signals = {}
         for key, parts in list(self._parts.items()):
             stamps, values = (np.concatenate(part) for part in zip(*parts, strict=True))

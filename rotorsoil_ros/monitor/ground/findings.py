@@ -10,7 +10,7 @@ from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Event, Grounded
 from rotorsoil_ros.monitor.ground.account import GroundShare
 from rotorsoil_ros.monitor.ground.attribution import Attribution
-from rotorsoil_ros.monitor.ground.broadband import Broadband
+from rotorsoil_ros.monitor.ground.broadband import Broadband, STRETCH_S
 from rotorsoil_ros.monitor.points import ChannelPoints
 from rotorsoil_ros.monitor.zones import HousingZone
 
@@ -76,5 +76,10 @@ class GroundCollector:
         zones = [one for one in attribution.account.zones.worst() if one.source == 'measured']
         sensors = [f'{name}: {line}' for name, sensor in attribution.sensors.items()
                    for line in sensor.refusals.lines()]
-        return GroundFindings(parts, shares, zones, list(attribution.spectra.rows()),
-                              [*attribution.doubts(), *sensors])
+        broadband = list(attribution.spectra.rows())
+        is_raw = any(one.is_raw for one in attribution.sensors.values())
+        short = [] if broadband or not is_raw else [
+            f'no {STRETCH_S} s in which ground and housings were sampled together without a hole: '
+            'of other frequencies than the speed nothing is told of the ground']
+        return GroundFindings(parts, shares, zones, broadband,
+                              [*attribution.doubts(), *sensors, *short])

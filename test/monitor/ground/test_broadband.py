@@ -77,15 +77,30 @@ def test_ground_that_has_nothing_to_do_with_the_housing_is_not_it(fan, busy):
     assert found.coherent < 0.3 * found.measured
 
 
-def test_a_minute_is_too_short_to_tell(fan, busy):
+def test_less_than_a_stretch_says_nothing(fan, busy):
     assert heard(fan, busy, seconds=20.0) == []
-    [found] = heard(fan, busy, seconds=40.0)
+    [found] = heard(fan, busy, seconds=33.0)
     assert found.averages == 15
 
 
 def test_stretch_with_a_hole_says_nothing(fan, busy):
     [whole], [holed] = heard(fan, busy), heard(fan, busy, hole=(70.0, 72.0))
     assert holed.averages == whole.averages - 15
+
+
+def test_memory_does_not_grow_where_one_of_both_falls_silent(fan, busy):
+    history = History()
+    history.add(np.array([START]), np.array([RUNNING]), np.array([np.nan]))
+    spectra = Spectra(fan.ground, ['yard'], history)
+    stamps = START + np.rint(1e9 * busy.time).astype(np.int64)
+    channel = next(iter(busy.housings))
+    spectra.take(channel, stamps[:250], busy.housings[channel][:250])
+    for first in range(0, len(stamps), 250):
+        part = slice(first, first + 250)
+        spectra.take_ground('yard', stamps[part], busy.sensors[0][:, part].T)
+        spectra.follow()
+    [(_, kept)] = spectra._parts.items()
+    assert sum(len(part[0]) for part in kept) <= 33 * RATE_HZ
 
 
 def test_lines_of_other_machines_are_left_out(fan, busy):
