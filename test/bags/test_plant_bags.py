@@ -13,7 +13,7 @@ from rotorsoil_ros.bags.tables.exported import export_log
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import Profile
+from rotorsoil_ros.profile import Profile
 from rotorsoil_ros.wire.definitions import JOINT_STATE
 from rotorsoil_ros.wire.messages import JointStateWriter, Records
 
