@@ -85,3 +85,14 @@ def inside(
             f'{name} must be in [{shown(low):g}, {shown(high):g}] {unit}, {where}, got '
             f'{shown(float(np.asarray(given)[outside][0])):g}')
     return held
+
+
+def side_by_side(found: Sequence[ComplexArray], count: int) -> ComplexArray:
+    """Return matrices (n, d, d) as the blocks of larger ones that nothing couples."""
+    sizes = [one.shape[-1] for one in found]
+    total = np.zeros((count, sum(sizes), sum(sizes)), dtype=complex)
+    place = 0
+    for one, size in zip(found, sizes, strict=True):
+        total[:, place:place + size, place:place + size] = one
+        place += size
+    return total

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rotorsoil_ros.arrays import ComplexArray
-from rotorsoil_ros.case import cache, document, schema, stiffness_file
+from rotorsoil_ros.case import cache, document, schema
 from rotorsoil_ros.case.block_entries import BlockEntries
 from rotorsoil_ros.case.case_errors import Faults, validated
 from rotorsoil_ros.case.entries.entry import Place
@@ -20,6 +20,7 @@ from rotorsoil_ros.case.entries.ground import (
 from rotorsoil_ros.case.entries.mending import all_faults
 from rotorsoil_ros.case.entries.sensors import Sensors, sensors_of
 from rotorsoil_ros.case.entries.site import GroundProbe, SiteEntries
+from rotorsoil_ros.case.entries.support_file import SupportFiles, Tables
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.plant.berth import Berth
 from rotorsoil_ros.case.plant.entries import PlantDocument
@@ -31,7 +32,6 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.ground.elements.table import require_kind
 from rotorsoil_ros.ground.layers.profile import Embedment, LayeredSoil
 from rotorsoil_ros.ground.soil import RigidSoil, Soil
-from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.response import bytes_needed
@@ -73,8 +73,8 @@ class Case:
         How deep each block stands in the ground, and how much of its wall is welded.
     ground_probes : tuple of GroundProbe
         Places on the ground whose motion is wanted.
-    tables : tuple of ComplianceTable
-        What each block stands on where a file says it; else empty.
+    tables : tuple of ComplianceTable or of one SeatReceptance
+        What each block, or all bearings, stand on where a file says it; else empty.
     uncertainty : SoilSpread
         How far the soil may be from what the file says.
     zones : ZoneLimits
@@ -110,7 +110,7 @@ class Case:
     ground: LayeredSoil | None = None
     embedments: tuple[Embedment, ...] = ()
     ground_probes: tuple[GroundProbe, ...] = ()
-    tables: tuple[ComplianceTable, ...] = ()
+    tables: Tables = ()
     uncertainty: SoilSpread = field(default_factory=SoilSpread)
     zones: ZoneLimits = ISO_10816_3[USUAL_GROUP]
     sensors: Sensors = field(default_factory=Sensors)
@@ -250,7 +250,8 @@ class _Builder:
         faults, entries, on = self.faults, self.faults.entries, GroundEntries(self.faults)
         ground = faults.attempt(on.ground)
         names_differ = faults.names_differ()
-        faults.attempt(self._refuse_unused_files)
+        files = SupportFiles(faults, self.files)
+        faults.attempt(files.refuse_unused)
         for refuse in (on.refuse_unfit_support, on.refuse_unfit_bed, on.refuse_unfit_spread):
             faults.attempt(refuse)
         speed_range = faults.attempt(self._speed_range)
@@ -264,7 +265,7 @@ class _Builder:
         probes = faults.attempt(SiteEntries(faults).probes)
         unbalances = Unbalances(faults, None if rotor is None else rotor.mass)
         unbalance = unbalances.total()
-        tables = None if speed_range is None else self._tables(speed_range)
+        tables = None if speed_range is None else files.tables(speed_range)
         journals = (None if rotor is None or speed_range is None
                     else self._journals().journals(rotor, speed_range))
         oils = faults.attempt(self._journals().oil_temperatures)
@@ -333,38 +334,6 @@ class _Builder:
                 f'must be fewer: {len(model.planes)} unbalance planes and {len(model.channels)} '
                 f'motions need a table of {needed / _GIB:.3g} GiB, more than '
                 f'{_LARGEST_TABLE / _GIB:g} GiB, got {len(model.rotor.discs)} discs'))
-
-    def _refuse_unused_files(self) -> None:
-        entries = self.faults.entries
-        if entries.support.model == 'table':
-            return
-        named = [(('support', 'file'), entries.support.file),
-                 *((('foundations', index, 'stiffness_file'), block.stiffness_file)
-                   for index, block in enumerate(entries.foundations))]
-        for place, file in named:
-            if file is not None:
-                raise self.faults.error(*place, problem='belongs to the support model table, '
-                                                        f'got {entries.support.model}')
-
-    def _tables(self, speed_range: tuple[float, float]) -> tuple[ComplianceTable, ...] | None:
-        """Return what the blocks stand on where a file says it, or None where one is at fault."""
-        entries = self.faults.entries
-        if entries.support.model != 'table':
-            return ()
-
-        def table(_: int, block: schema.FoundationEntry) -> ComplianceTable:
-            file = block.stiffness_file or entries.support.file
-            if file is None:
-                raise self.faults.error('support', 'file', problem='is missing; the support model '
-                                                                   'table needs it')
-            # A path means the same wherever the program is called.
-            path = self.faults.path.parent / file
-            if file not in self.files:
-                self.files[file] = stiffness_file.text_of(path)
-            return stiffness_file.read(path, speed_range, text=self.files[file],
-                                       cut_offs_hz=entries.support.cut_offs_hz or ())
-
-        return self.faults.attempt_each(table, entries.foundations)
 
     def _refuse_unreachable_soil(self, case: Case) -> None:
         """Keep a fault for every block below which the method would not reach far enough."""

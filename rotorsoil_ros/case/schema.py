@@ -83,7 +83,7 @@ class SupportEntry(Entry):
     """Which model of the soil stands below the blocks."""
 
     model: Literal['rigid', 'cone', 'infinite_elements', 'boundary_elements', 'thin_layers',
-                   'table']
+                   'table', 'receptance']
     geometry: Literal['disc', 'plane_strain', 'plane_stress'] = 'disc'
     file: FileName | None = None
     cut_offs_hz: list[Hertz] | None = None

@@ -1,6 +1,6 @@
 """What somebody else computed or measured of the ground: a dynamic stiffness in a CSV file."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 import csv
 from dataclasses import replace
 import math
@@ -17,6 +17,8 @@ from rotorsoil_ros.ground.table import ComplianceTable, PASSIVITY, RECIPROCITY
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz
 
 _FREQUENCIES = ('omega_rad_s', 'hz')
+# What the verb `seats` calls the second in plant units.
+_PLANT_HERTZ = 'frequency_hz'
 _ENTRIES = {f'{row}{column}': (i, j) for i, row in enumerate(DOFS)
             for j, column in enumerate(DOFS)}
 _LARGEST_BYTES = 32 * 1024 * 1024
@@ -65,8 +67,9 @@ def read(
         does not cover what it has to.
 
     """
-    columns = _columns(path, text_of(path) if text is None else text)
-    omega = _frequencies(path, columns, covering)
+    columns = columns_of(path, text_of(path) if text is None else text, _ENTRIES,
+                         example='xx_re, xx_im, zz_re, ...')
+    omega = frequencies_of(path, columns, covering)
     stiffness = _matrices(path, columns, len(omega))
     free = _free_dofs(path, stiffness)
     part = stiffness[np.ix_(np.arange(len(omega)), free, free)]
@@ -102,26 +105,44 @@ def text_of(path: Path) -> str:
         raise InputError(f'{path}: is not a text file in UTF-8 (byte {error.start})') from error
 
 
-def _columns(path: Path, text: str) -> dict[str, FloatArray]:
-    """Return the numbers below each heading; NaN where a cell is empty."""
+def columns_of(
+    path: Path, text: str, entries: Collection[str], *, example: str,
+) -> dict[str, FloatArray]:
+    """
+    Return the numbers below each heading; NaN where a cell is empty.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    text : str
+        What it says.
+    entries : collection of str
+        Names of what may be in it, each as `<name>_re,<name>_im`, beside the frequency.
+    example : str
+        How such columns are called.
+
+    """
     lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), start=1)
              if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#')]
     if not lines:
         raise InputError(f'{path}: is empty')
-    header = [cell.strip() for cell in lines[0][1]]
-    _require_header(path, header)
+    header = [cell.strip().replace(_PLANT_HERTZ, 'hz') for cell in lines[0][1]]
+    _require_header(path, header, entries, example)
     numbers = np.array([[_number(path, line, name, cell) for name, cell
                          in zip(header, _of_length(path, line, row, len(header)), strict=True)]
                         for line, row in lines[1:]]).reshape(-1, len(header))
     return dict(zip(header, numbers.T, strict=True))
 
 
-def _require_header(path: Path, header: list[str]) -> None:
-    known = {f'{name}_{part}' for name in _ENTRIES for part in ('re', 'im')}
+def _require_header(
+    path: Path, header: list[str], entries: Collection[str], example: str,
+) -> None:
+    known = {f'{name}_{part}' for name in entries for part in ('re', 'im')}
     for name in header:
         if name not in known and name not in _FREQUENCIES:
             raise InputError(f'{path}: column {shown(name)} is not known; needed are '
-                             f'{" or ".join(_FREQUENCIES)}, and xx_re, xx_im, zz_re, ...')
+                             f'{" or ".join(_FREQUENCIES)}, and {example}')
         if header.count(name) > 1:
             raise InputError(f'{path}: column {name} stands here twice')
         other = f'{name[:-2]}{"im" if name.endswith("_re") else "re"}'
@@ -151,9 +172,10 @@ def _number(path: Path, line: int, column: str, cell: str) -> float:
     return value
 
 
-def _frequencies(
+def frequencies_of(
     path: Path, columns: dict[str, FloatArray], covering: tuple[float, float],
 ) -> FloatArray:
+    """Return the rising frequencies of a file, which have to cover some [rad/s]."""
     name = next(name for name in _FREQUENCIES if name in columns)
     values = columns[name]
     if not (len(values) >= 2 and values[0] >= 0.0 and np.all(np.diff(values) > 0.0)):
@@ -175,13 +197,8 @@ def _matrices(path: Path, columns: dict[str, FloatArray], count: int) -> Complex
     stiffness = np.zeros((count, len(DOFS), len(DOFS)), dtype=complex)
     known = {}
     for name, place in _ENTRIES.items():
-        if f'{name}_re' not in columns:
-            continue
-        values = columns[f'{name}_re'] + 1j * columns[f'{name}_im']
-        empty = np.isnan(values)
-        if np.any(empty) and not np.all(empty):
-            raise InputError(f'{path}: {name} must be given at all frequencies or at none')
-        if not np.any(empty):
+        values = entry_of(path, columns, name)
+        if values is not None:
             known[place] = values
     for (i, j), values in known.items():
         stiffness[:, i, j] = values
@@ -193,6 +210,17 @@ def _matrices(path: Path, columns: dict[str, FloatArray], count: int) -> Complex
                 raise InputError(f'{path}: {DOFS[i]}{DOFS[j]} needs {DOFS[dof]}{DOFS[dof]}, '
                                  'which is missing')
     return stiffness
+
+
+def entry_of(path: Path, columns: dict[str, FloatArray], name: str) -> ComplexArray | None:
+    """Return one entry over all frequencies, (n,); None of one that is not there."""
+    if f'{name}_re' not in columns:
+        return None
+    values = columns[f'{name}_re'] + 1j * columns[f'{name}_im']
+    empty = np.isnan(values)
+    if np.any(empty) and not np.all(empty):
+        raise InputError(f'{path}: {name} must be given at all frequencies or at none')
+    return None if np.any(empty) else values
 
 
 def _free_dofs(path: Path, stiffness: ComplexArray) -> IntArray:

@@ -19,7 +19,8 @@ from rotorsoil_ros.case.design.ground import (
 )
 from rotorsoil_ros.case.design.rigidity import bending_told
 from rotorsoil_ros.case.design.sensing import of_sensors, sensors_told
-from rotorsoil_ros.case.flexible.words import bodies_told, of_bodies
+from rotorsoil_ros.case.entries.support_file import FILED
+from rotorsoil_ros.case.flexible.words import bodies_told, of_bodies, of_seats, seats_told
 from rotorsoil_ros.case.plausible import slips
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError
@@ -32,6 +33,7 @@ from rotorsoil_ros.ground.soil import (
     Soil,
     SoilModel,
 )
+from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.machine.response import ResponseTable
@@ -94,6 +96,7 @@ def derived_quantities(
             yield f'{foundation.name}: model error', told
     yield from bending_told(case, soil_models)
     yield from bodies_told(case)
+    yield from seats_told(case)
     yield from of_site(case, soil_models)
     yield from sensors_told(case)
     for journal in case.journals:
@@ -161,6 +164,7 @@ def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[s
     yield from of_shapes(case, shapes)
     yield from of_bodies(case)
     yield from of_sensors(case)
+    yield from of_seats(case)
     for foundation in case.foundations:
         small, medium, large = sorted(foundation.inertia)
         if large > (1.0 + 1e-9) * (small + medium):
@@ -214,13 +218,17 @@ def stability_told(found: Stability, units: Units) -> str:
     return f'stable from {low} to {high}: {how}'
 
 
-def clipped(span: tuple[float, float], wanted: tuple[float, float]) -> list[str]:
-    """Return a remark where tables of bearings end before speeds [rad/s] that are looked at."""
+def clipped(
+    model: CoupledModel, span: tuple[float, float], wanted: tuple[float, float],
+) -> list[str]:
+    """Return a remark where tables end before speeds [rad/s] that are looked at."""
     if wanted[0] >= span[0] and wanted[1] <= span[1]:
         return []
     low, high = (rad_s_to_rpm(speed) for speed in span)
-    return [f'critical speeds are looked for from {low:g} to {high:g} rpm only: tables of '
-            'bearings end there']
+    first, last = model.support.reach
+    by_file = last == span[1] < wanted[1] or wanted[0] < span[0] == first
+    return [f'critical speeds are looked for from {low:g} to {high:g} rpm only: '
+            + ('the file of the support ends' if by_file else 'tables of bearings end') + ' there']
 
 
 def stability_doubts(found: Stability) -> Iterator[str]:
@@ -228,7 +236,7 @@ def stability_doubts(found: Stability) -> Iterator[str]:
     if found.doubt:
         yield f'whether the machine is stable is not known: {found.doubt}'
     for which, edge, why in (
-            ('below', found.untold_below, 'tables of bearings begin there'),
+            ('below', found.untold_below, found.why_below),
             ('above', found.untold_above, found.untold_why)):
         if 0.0 < edge < math.inf:
             yield (f'whether a mode {which} {rad_s_to_hz(edge):.4g} Hz is stable is not known: '
@@ -243,9 +251,9 @@ def without_transients(case: Case, table: ResponseTable) -> Iterator[str]:
 
 def undecided(case: Case, error: NotSolvedError) -> str:
     """Return why modes are not known, with what a user may do where a file is the reason."""
-    if case.support.model != 'table':
+    if case.support.model not in FILED:
         return str(error)
-    return (f'support.file: {error}; modes need a stiffness that follows one smooth curve: give '
+    return (f'support.file: {error}; modes need what follows one smooth curve: give '
             'it at more frequencies, or without jumps (the response needs no modes)')
 
 

@@ -117,7 +117,7 @@ def _range_of(arguments: Namespace, machine: Machine) -> tuple[float, float]:
         raise InputError(f'--running must be > 0 rpm, got {running:g}')
     least, most = asked(rpm_to_rad_s(running))
     wanted = min(least, rpm_to_rad_s(low)), max(most, rpm_to_rad_s(high))
-    span = machine.model.bearings.within_tables(wanted)
-    for text in clipped(span, wanted):
+    span = machine.model.support.within(machine.model.bearings.within_tables(wanted))
+    for text in clipped(machine.model, span, wanted):
         print(f'{text}; margins beyond are not known', file=sys.stderr)
     return rad_s_to_rpm(span[0]), rad_s_to_rpm(span[1])

@@ -94,9 +94,10 @@ def _ground_figures(case: Case, model: CoupledModel) -> Iterator[tuple[str, 'Fig
     if case.support.model == 'rigid':
         return
     speed = fastest_steady(model, case.speed_range)
-    if speed is None:
-        print(f'no picture transmissibility: {case.path}: unstable at all speeds',
-              file=sys.stderr)
+    why = ('receptances do not tell how seats follow the ground'
+           if model.support.table is not None else 'unstable at all speeds')
+    if speed is None or model.support.table is not None:
+        print(f'no picture transmissibility: {case.path}: {why}', file=sys.stderr)
     else:
         yield 'transmissibility', transmissibility_figure(case, model, speed=speed)
 

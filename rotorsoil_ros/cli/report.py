@@ -216,7 +216,7 @@ def _criticals(
     """Return every critical speed to which the speed range has to keep a margin, and doubts."""
     low, high = case.speed_range
     wanted = low, asked(high)[1]
-    span = model.bearings.within_tables(wanted)
+    span = model.support.within(model.bearings.within_tables(wanted))
     names, lines = ModeNames(model), []
     found = critical_speeds(model, span)
     criticals = [one for one in found if abs(one.damping_ratio) <= LARGEST_DAMPING_RATIO]
@@ -240,7 +240,7 @@ def _criticals(
     if not lines:
         lines.append(('critical speeds', f'none from {units.speed(span[0])} up to '
                                          f'{units.speed(span[1])}'))
-    return lines, clipped(span, wanted)
+    return lines, clipped(model, span, wanted)
 
 
 def _peaks(case: Case, table: ResponseTable) -> list[Peak]:

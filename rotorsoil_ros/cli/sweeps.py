@@ -201,6 +201,7 @@ def frf(arguments: Namespace) -> int:
 def transmissibility(arguments: Namespace) -> int:
     """Write the motion of every channel per motion of the ground along x, y and z."""
     machine, plant = machine_of(arguments), units_of(arguments) == PLANT
+    _ = machine.model.support.follow_rows  # what does not tell it says so before a file is begun
     names = [f'{channel}__ground_{axis}' for channel in machine.model.channels for axis in ALONG]
     header = ['frequency_hz', *(f'{name}{kind}' for name in names for kind in ('', '_lag_deg'))
               ] if plant else ['omega_rad_s', *complex_names(names)]

@@ -23,12 +23,14 @@ from rotorsoil_ros.machine.damping import (
     TORQUE,
 )
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
+from rotorsoil_ros.machine.modes.names import BELOW
 from rotorsoil_ros.machine.modes.stability import stability
 from rotorsoil_ros.units import rad_s_to_rpm
 
 _COLOURS = dict(zip(
-    (RADIATION, MATERIAL, BEARINGS, PEDESTALS, SOIL, INTERNAL, EXTERNAL, TORQUE, STRUCTURE),
-    (*COLOURS[:4], 'grey', 'firebrick', 'darkkhaki', 'black', 'slategrey'), strict=True))
+    (RADIATION, MATERIAL, BEARINGS, PEDESTALS, SOIL, INTERNAL, EXTERNAL, TORQUE, STRUCTURE,
+     BELOW),
+    (*COLOURS[:4], 'grey', 'firebrick', 'darkkhaki', 'black', 'slategrey', 'peru'), strict=True))
 _SPEEDS = 241
 _MOST_MODES = 12
 
@@ -39,7 +41,8 @@ def damping_figure(case: Case, model: CoupledModel) -> Figure:
     speed = np.linspace(*case.speed_range, _SPEEDS)[1:]
     forced = splitter.forced(speed, case.unbalance).where(
         stability(model, case.speed_range).holds(speed))
-    criticals = critical_speeds(model, model.bearings.within_tables(case.speed_range))
+    criticals = critical_speeds(model, model.support.within(
+        model.bearings.within_tables(case.speed_range)))
     modes = [(critical, split) for critical, split in zip(
         criticals, splitter.of_modes(criticals), strict=True) if split is not None][:_MOST_MODES]
     share = 0.25 + 0.12 * len(modes) if modes else 0.0

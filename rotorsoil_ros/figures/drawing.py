@@ -9,6 +9,7 @@ from matplotlib.patches import Circle as Round, Polygon, Rectangle as Box
 import numpy as np
 
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.entries.support_file import FILED
 from rotorsoil_ros.case.plant.berth import mounts
 from rotorsoil_ros.figures.site import draw_plan, frame
 from rotorsoil_ros.figures.strata import draw_ground, drawn_depth, sides
@@ -106,8 +107,8 @@ def _extent(case: Case) -> tuple[float, float, float, float]:
 
 
 def _support(case: Case) -> str:
-    if case.support.model == 'table':
-        return 'ground as its file says'
+    if case.support.model in FILED:
+        return f'{"ground" if case.foundations else "foundation and ground"} as the file says'
     if case.soil is None or case.support.model == 'rigid':
         return 'rigid ground'
     if case.ground is not None and case.ground.layers:

@@ -16,6 +16,7 @@ from rotorsoil_ros.figures.drawing import machine_drawing
 from rotorsoil_ros.figures.site import site_plan
 from rotorsoil_ros.ground.soil import Circle, singular_of, Soil, SoilModel
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.peaks import Peak, resolved_speeds, resonances
@@ -88,6 +89,8 @@ def channel_groups(case: Case) -> dict[str, list[Channel]]:
 
 def support(case: Case, model: CoupledModel) -> Figure:
     """Draw what the soil under every block opposes to one force or moment, over frequency."""
+    if model.support.table is not None:
+        return _seats(case, model.support.table)
     omega = np.linspace(*case.speed_range, 400)
     figure = Figure(figsize=(7.5, 7.5), layout='constrained')
     grid = figure.subplots(3, 2, sharex=True)
@@ -111,6 +114,29 @@ def support(case: Case, model: CoupledModel) -> Figure:
     for axes in grid.flat:
         tidy(axes)
     figure.suptitle(f'{case.name}: soil below the massless contact, one direction at a time',
+                    fontsize=10)
+    return figure
+
+
+def _seats(case: Case, table: SeatReceptance) -> Figure:
+    """Draw how every seat answers a force on itself: rows of the table, and what leads on."""
+    omega = np.linspace(table.omega[0], table.omega[-1], 1000)
+    figure = Figure(figsize=(7.5, 5.2), layout='constrained')
+    amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    for place, seat in enumerate(table.seats):
+        colour = COLOURS[place % len(COLOURS)]
+        for at, values, style in ((omega, table.compliance(omega), {'linewidth': 1.0}),
+                                  (table.omega, table.values, {'linestyle': '', 'marker': '.'})):
+            own = values[:, place, place]
+            amplitude.plot(rad_s_to_hz(at), np.abs(own), color=colour, **style)
+            phase.plot(rad_s_to_hz(at), -np.degrees(np.angle(own)), color=colour, **style)
+        amplitude.lines[-1].set_label(seat)
+    amplitude.set(ylabel='receptance of the seat itself [m/N]', yscale='log')
+    phase.set(ylabel='lag [deg]', xlabel='frequency [Hz]')
+    legend_below(figure, amplitude, columns=4)
+    for axes in (amplitude, phase):
+        tidy(axes)
+    figure.suptitle(f'{case.name}: foundation and ground by their receptances, rows as dots',
                     fontsize=10)
     return figure
 

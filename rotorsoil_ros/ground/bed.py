@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable, Self
 
 import numpy as np
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, side_by_side
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.soil import second_opinion_of, singular_of, SoilModel
@@ -136,12 +136,7 @@ class PatchesApart:
         """Return the compliance over the motions of all patches, (n, c, c)."""
         # Equal patches share a model, which is asked once.
         asked = {id(model): model.compliance(omega) for model in self.models}
-        size = sum(asked[id(model)].shape[-1] for model in self.models)
-        total, place = np.zeros((len(omega), size, size), dtype=complex), 0
-        for model in self.models:
-            found = asked[id(model)]
-            own = slice(place, place + found.shape[-1])
-            total[:, own, own], place = found, own.stop
+        total = side_by_side([asked[id(model)] for model in self.models], len(omega))
         kept = np.array(self.kept, dtype=int)
         return total[:, kept[:, None], kept]
 

@@ -17,6 +17,9 @@ _EXACT = 1e-9
 # Two fits that differ less, relative to the largest entry, say the same.
 _AGREED = 1e-2
 
+# Two poles nearer than this share of their frequency are one.
+_BESIDE = 1e-4
+
 # What a fit misses may change by so much within the bandwidth of a vibration: a measured table
 # has a few percent of noise.
 _STEADY = 0.1
@@ -28,7 +31,7 @@ _SPREAD = 4.0
 # what is said of them must be said by the samples of another range too, by all but this share at
 # an end, as well as this. Artefacts, which move with the range, differ by more than a quarter.
 _FAR_ABOVE = 0.2
-_OTHER_RANGE = 0.25
+OTHER_RANGE = 0.25
 _PERSISTS = 0.1
 
 # Where in the half bandwidth of a vibration a rough fit is corrected.
@@ -38,7 +41,32 @@ _BANDWIDTH = (-1.0, -0.5, 0.0, 0.5, 1.0)
 _UNCOUPLED = 1e-10
 
 # What couples, and its fit.
-_Parts: TypeAlias = tuple[tuple[IntArray, RationalMatrix], ...]
+_Parts: TypeAlias = tuple[tuple[IntArray, RationalMatrix | States], ...]
+
+
+@dataclass(frozen=True)
+class Laws:
+    """
+    What a function is known to follow, so that it needs no fit.
+
+    Attributes
+    ----------
+    whole, other : States
+        By all that is known of it, and by other samples.
+    lower, upper : States
+        By all but the upper or lower `OTHER_RANGE` of the frequencies.
+
+    """
+
+    whole: States
+    other: States
+    lower: States
+    upper: States
+
+    def over(self, size: FloatArray) -> 'Laws':
+        """Return the same over sizes (d,)."""
+        return Laws(self.whole.over(size), self.other.over(size), self.lower.over(size),
+                    self.upper.over(size))
 
 
 @dataclass(frozen=True)
@@ -48,11 +76,11 @@ class Continuation:
 
     Attributes
     ----------
-    parts : tuple of (indices, RationalMatrix)
+    parts : tuple of (indices, RationalMatrix or States)
         What does not couple is fitted by itself, so that no part has poles of another.
     size : (d,) float array
         Typical square root of the diagonal, which makes the entries comparable.
-    others : tuple of (indices, RationalMatrix)
+    others : tuple of (indices, RationalMatrix or States)
         The same from every other sample.
     known : callable or None
         The function at real frequencies (n,), where the fit is too rough; else None.
@@ -66,11 +94,13 @@ class Continuation:
         As in `of`.
     blur : float
         As in `of`.
+    law : Laws or None
+        As in `of`, over the size.
 
     """
 
-    parts: tuple[tuple[IntArray, RationalMatrix], ...]
-    others: tuple[tuple[IntArray, RationalMatrix], ...]
+    parts: _Parts
+    others: _Parts
     size: FloatArray
     known: Callable[[FloatArray], ComplexArray] | None
     span: tuple[float, float]
@@ -78,6 +108,7 @@ class Continuation:
     samples: tuple[FloatArray, ComplexArray]
     within: tuple[float, float]
     blur: float
+    law: Laws | None
 
     @classmethod
     def of(
@@ -86,6 +117,7 @@ class Continuation:
         other: Callable[[FloatArray], ComplexArray] | None = None,
         within: tuple[float, float] = (-np.inf, np.inf),
         span: tuple[float, float] | None = None, blur: float = 0.0,
+        law: Laws | None = None,
     ) -> 'Continuation':
         """
         Fit a function.
@@ -106,6 +138,8 @@ class Continuation:
             Where the function is known, if that is farther than its samples [rad/s].
         blur : float
             How far off the ends of the span may be [rad/s].
+        law : Laws, optional
+            Of the first of all motions.
 
         """
         values = known(omega)
@@ -113,12 +147,17 @@ class Continuation:
             size = typical_size(values)
         values = values / (size[:, None] * size)
         second = values[::2] if other is None else other(omega[::2]) / (size[:, None] * size)
-        groups = _coupled(values)
-        fit = cls(_fits(groups, omega, values, within), _fits(groups, omega[::2], second, within),
+        led = 0 if law is None else len(law.whole.constant)
+        groups = [np.arange(led)] * (led > 0) + [
+            led + group for group in _coupled(values[:, led:, led:])]
+        own = None if law is None else law.over(size[:led])
+        fit = cls(_fits(groups, omega, values, within, None if own is None else own.whole),
+                  _fits(groups, omega[::2], second, within, None if own is None else own.other),
                   size, None, span or (float(omega[0]), float(omega[-1])), 0.0, (omega, values),
-                  within, blur)
+                  within, blur, own)
         missed = float(np.abs(fit(omega.astype(complex)) - values).max(initial=0.0))
-        return replace(fit, known=known, missed=missed) if missed > _EXACT else fit
+        exact = law is not None or missed <= _EXACT
+        return fit if exact else replace(fit, known=known, missed=missed)
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:
         """Return the function over its size at complex frequencies, (..., d, d)."""
@@ -151,6 +190,13 @@ class Continuation:
         gap = one - other
         if self.known is None:
             agreed = _largest(gap) <= _AGREED * _largest(one)
+            if self.law is not None:
+                # Beside a pole that both have, as a mode that hardly moves the contacts is, what
+                # they differ by is where the pole is.
+                aside = (1.0 + _BESIDE) * omega
+                agreed |= _largest(gap) <= np.minimum(
+                    _largest(self._fitted(self.parts, aside) - one),
+                    _largest(self._fitted(self.others, aside) - other))
             return np.asarray(agreed & self.persists(omega))
         real = omega.real.astype(complex)
         gap -= self._fitted(self.parts, real) - self._fitted(self.others, real)
@@ -189,10 +235,11 @@ class Continuation:
     def _other_ranges(self) -> tuple[_Parts, _Parts]:
         """The same from the samples of the lower and of the upper part of the span."""
         (omega, values), (low, high) = self.samples, self.span
-        cut, groups = _OTHER_RANGE * (high - low), [index for index, _ in self.parts]
+        cut, groups = OTHER_RANGE * (high - low), [index for index, _ in self.parts]
+        laws = (None, None) if self.law is None else (self.law.lower, self.law.upper)
         lower, upper = (
-            _fits(groups, omega[own], values[own], self.within)
-            for own in (omega <= high - cut, omega >= low + cut))
+            _fits(groups, omega[own], values[own], self.within, law)
+            for own, law in zip((omega <= high - cut, omega >= low + cut), laws, strict=True))
         return lower, upper
 
     def _fitted(self, parts: _Parts, omega: ComplexArray) -> ComplexArray:
@@ -225,10 +272,12 @@ def _coupled(values: ComplexArray) -> list[IntArray]:
 
 def _fits(
     groups: Sequence[IntArray], omega: FloatArray, values: ComplexArray,
-    within: tuple[float, float],
+    within: tuple[float, float], law: States | None,
 ) -> _Parts:
-    return tuple((index, RationalMatrix.of(omega, values[:, index[:, None], index], within))
-                 for index in groups)
+    """Return a fit for every group of motions, for the first of them its law if it has one."""
+    known = [] if law is None else [(groups[0], law)]
+    return (*known, *((index, RationalMatrix.of(omega, values[:, index[:, None], index], within))
+                      for index in groups[len(known):]))
 
 
 def typical_size(values: ComplexArray) -> FloatArray:

@@ -1,13 +1,13 @@
 """Rational functions through samples at real frequencies, with common poles."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray
+from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray
 
 # A fit ends when every sample is met this well, relative to the diagonal of its matrix ...
 _TOLERANCE = 1e-12
@@ -55,6 +55,30 @@ class States:
     poles: ComplexArray
     left: ComplexArray
     right: ComplexArray
+
+    def __call__(self, omega: ComplexArray) -> ComplexArray:
+        """Return the function at real or complex frequencies, (..., d, d)."""
+        gains = 1.0 / (omega[..., None] - self.poles)
+        return np.asarray(self.constant + (self.left * gains[..., None, :]) @ self.right)
+
+    def over(self, size: FloatArray) -> 'States':
+        """Return the function over sizes (d,) of its rows and of its columns."""
+        return States(self.constant / (size[:, None] * size), self.poles,
+                      self.left / size[:, None], self.right / size)
+
+    @property
+    def height(self) -> FloatArray:
+        """Size of the largest entry of each term, times the distance to its pole, (s,)."""
+        return np.asarray(np.abs(self.left).max(axis=0, initial=0.0)
+                          * np.abs(self.right).max(axis=1, initial=0.0))
+
+    def states(self, tolerance: float) -> 'States':
+        """Return the same, terms below the tolerance at real frequencies left out."""
+        return self.of(self.height > tolerance * np.abs(self.poles.imag))
+
+    def of(self, kept: BoolArray) -> 'States':
+        """Return the same with some of the terms only."""
+        return States(self.constant, self.poles[kept], self.left[:, kept], self.right[kept])
 
     def beside(self, constant: ComplexArray) -> 'States':
         """Return the same with motions behind it that give way by constants, (k,)."""
@@ -128,9 +152,8 @@ class RationalMatrix:
         found = self.states(_ROUGH)
         decay = found.poles.imag / omega[-1]
         narrow = np.abs(found.poles.imag) < _NARROW * np.abs(found.poles)
-        height = (np.abs(found.left).max(axis=0, initial=0.0)
-                  * np.abs(found.right).max(axis=1, initial=0.0))
-        noise = (decay < -_ON_AXIS) | (narrow & (height < _LOW_PEAK * np.abs(found.poles.imag)))
+        low = found.height < _LOW_PEAK * np.abs(found.poles.imag)
+        noise = (decay < -_ON_AXIS) | (narrow & low)
         noise &= (found.poles.real > within[0]) & (found.poles.real < within[1])
         noise &= np.abs(found.poles) < _NEAR * omega[-1]
         return not noise.any() and bool(np.abs(found.constant).max(initial=0.0) < _BOUND)
@@ -142,6 +165,10 @@ class RationalMatrix:
         values = cauchy @ self.values.reshape(len(self.nodes), -1)
         values /= cauchy.sum(axis=-1)[..., None]
         return np.asarray(values.reshape(*omega.shape, *self.values.shape[1:]))
+
+    def over(self, size: FloatArray) -> 'RationalMatrix':
+        """Return the function over sizes (d,) of its rows and of its columns."""
+        return replace(self, values=self.values / (size[:, None] * size))
 
     def partial_fractions(self) -> tuple[ComplexArray, ComplexArray]:
         """Return poles (s,) and the residues of all entries, (s, d d)."""

@@ -240,6 +240,8 @@ def below_each(models: Sequence[SoilModel], blocks: int) -> tuple[SoilModel, ...
         If there is neither one model for each nor one that knows of all of them.
 
     """
+    if not blocks:
+        return ()
     if len(models) == 1 and isinstance(models[0], SharedGround) and models[0].blocks == blocks:
         return tuple(OneOfBlocks(models[0], index) for index in range(blocks))
     if len(models) != blocks:

@@ -8,9 +8,11 @@ import math
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
-from rotorsoil_ros.ground.continuation import Continuation, typical_size
+from rotorsoil_ros.errors import NotSolvedError
+from rotorsoil_ros.ground.continuation import Continuation, Laws, typical_size
 from rotorsoil_ros.ground.soil import second_opinion_of, singular_of
 from rotorsoil_ros.ground.table import ComplianceTable
+from rotorsoil_ros.machine.flexible.receptance import TELLS_MODES
 from rotorsoil_ros.machine.support import Support
 
 # Samples from which the compliance is continued, and those of a piece between branch points.
@@ -42,7 +44,32 @@ def continued(support: Support, span: tuple[float, float]) -> Continuation:
     omega = np.unique(np.concatenate([
         np.linspace(low, high, _SAMPLES // 2),
         np.geomspace(max(low, 1e-3 * high), high, _SAMPLES // 2)]))
-    return Continuation.of(omega, support.motion_compliance, other=_other(support))
+    # What has mass of its own, as a table of receptances, has mirror images of its poles at
+    # negative frequencies, which grow where its damping is hysteretic.
+    within = (-math.inf, math.inf) if support.table is None else (0.0, math.inf)
+    return Continuation.of(omega, support.motion_compliance, other=_other(support),
+                           within=within, law=_law(support))
+
+
+def _law(support: Support) -> Laws | None:
+    """
+    Return what a table of seats follows; None without a table.
+
+    Raises
+    ------
+    NotSolvedError
+        If it is measured, or of few digits: noise is no function of decaying vibrations.
+
+    """
+    table = support.table
+    if table is None:
+        return None
+    if table.poles is None:
+        raise NotSolvedError(
+            f'receptances of seats must follow one law within {TELLS_MODES:g} of a row to tell '
+            f'how free vibrations decay, got {table.missed:.2g}: give computed ones with nine '
+            'digits or more, or fit modes to measured ones (foundations, flexible, modes)')
+    return table.poles
 
 
 def _singular(support: Support, span: tuple[float, float]) -> FloatArray:

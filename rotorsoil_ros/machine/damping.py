@@ -13,6 +13,7 @@ from rotorsoil_ros.machine.continued import continued as continued_of
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import CriticalSpeed
+from rotorsoil_ros.machine.modes.names import BELOW
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.losses import WHIRL_DIRECTIONS
@@ -24,7 +25,7 @@ BEARINGS, PEDESTALS, STRUCTURE, RADIATION, MATERIAL, SOIL = (
 # By the shaft: its material, what stands around it, and the torque, which may give.
 INTERNAL, EXTERNAL, TORQUE = 'shaft material', 'around the rotor', 'torque'
 _OF_SHAFT = (INTERNAL, EXTERNAL, TORQUE)
-DAMPERS = (BEARINGS, PEDESTALS, STRUCTURE, *_OF_SHAFT, RADIATION, MATERIAL, SOIL)
+DAMPERS = (BEARINGS, PEDESTALS, STRUCTURE, *_OF_SHAFT, RADIATION, MATERIAL, SOIL, BELOW)
 
 # Above, a mode hardly swings before it is gone, and shares of its decay mean nothing.
 LARGEST_DAMPING_RATIO = 0.7
@@ -144,6 +145,7 @@ class DampingSplitter:
                   if bearing.pedestal is not None),
                 *((STRUCTURE, block.name) for block in self._bending),
                 *((kind, block.name) for kind in soil for block in self.model.foundations),
+                *((BELOW, 'table') for _ in range(self.model.support.table is not None)),
                 *((_OF_SHAFT[index], name or 'rotor') for name, losing in zip(
                     self.model.machines, self._losing, strict=True) for index in losing))
 
@@ -174,12 +176,14 @@ class DampingSplitter:
         pairs = (len(speed), len(seats) // 4, 2, 2)
         journal, housing = np.moveaxis(found.displacement[:, seats].reshape(pairs), 2, 0)
         through = found.force[:, seats].reshape(pairs)[:, :, 0]
-        contacts = [model.channels.index(channel)
-                    for part in support.members for channel in part.contacts]
-        motion, into_soil = found.displacement[:, contacts], found.force[:, contacts]
         flat = housing.reshape(len(speed), -1)
         below = through.reshape(flat.shape) + speed[:, None] ** 2 * (flat @ support.housing_mass)
         deflection = np.einsum('nij,nj->ni', support.pedestals(speed), below)
+        contacts = [] if support.table is not None else [
+            model.channels.index(channel)
+            for part in support.members for channel in part.contacts]
+        motion, into_soil = (flat - deflection, below) if support.table is not None else (
+            found.displacement[:, contacts], found.force[:, contacts])
         own, arriving = support.pedestal_axes, ((flat - deflection).conj() * below).imag
         structure = [arriving[:, list(part.seats)].sum(axis=1) - taken for part, taken in zip(
             support.members, self._by_foundation(motion, into_soil).T, strict=True)]
@@ -299,7 +303,7 @@ class DampingSplitter:
         films = (gap.conj() * through).imag.sum(axis=2)
         springs = (deflection.conj() * below).imag.reshape(rows, -1, 2).sum(axis=2)
         bends = [taken[:, None] for taken, block in zip(
-            structure, self.model.foundations, strict=True) if block.body is not None]
+            structure, self.model.foundations, strict=False) if block.body is not None]
         soil = self._by_foundation(motion, into_soil)
         if radiated is None:
             return np.concatenate([films, springs, *bends, soil], axis=1)
@@ -348,7 +352,8 @@ def _whirl(
 
 def _is_passive(split: DampingSplit) -> bool:
     """Return whether soil and its material only take; bearings may give."""
-    taken = [split.share(kind) for kind in split.kinds if kind in (RADIATION, MATERIAL, SOIL)]
+    taken = [split.share(kind) for kind in split.kinds
+             if kind in (RADIATION, MATERIAL, SOIL, BELOW)]
     return all(share[0] >= -_NOTHING for share in taken if math.isfinite(share[0]))
 
 

@@ -20,8 +20,8 @@ _MOST_SAMPLES = 4096
 
 # Half-widths, and what is no input; everything else is a factor.
 _HALF_WIDTHS = ('poisson_ratio', 'loss_factor')
-_GROUND = ('rock_depth', 'side_contact', 'ground_water')
-_NO_FACTORS = (*_HALF_WIDTHS, *_GROUND, 'samples', 'model_form', 'layers')
+OF_GROUND = ('rock_depth', 'side_contact', 'ground_water')
+_NO_FACTORS = (*_HALF_WIDTHS, *OF_GROUND, 'samples', 'model_form', 'layers')
 
 # Of the soil: what only a support that knows of one depends on.
 SOIL_INPUTS = ('shear_modulus_factor', 'poisson_ratio', 'loss_factor', 'soil_density_factor')
@@ -137,11 +137,11 @@ class SoilSpread:
     def inputs(self, *, with_soil: bool) -> tuple[str, ...]:
         """Return the names of what is not known exactly, those of the soil first."""
         others = (own.name for own in fields(self)
-                  if own.name not in (*SOIL_INPUTS, *_GROUND, 'samples', 'model_form', 'layers',
+                  if own.name not in (*SOIL_INPUTS, *OF_GROUND, 'samples', 'model_form', 'layers',
                                       OF_LAYER))
         known = tuple(name for name in (*(SOIL_INPUTS if with_soil else ()), *others)
                       if getattr(self, name) > (0.0 if name in _HALF_WIDTHS else 1.0))
-        ground = (*self._of_layers, *(name for name in _GROUND if getattr(self, name)))
+        ground = (*self._of_layers, *(name for name in OF_GROUND if getattr(self, name)))
         # Behind the stiffness of the soil, which comes before all others.
         return (*known[:1], *ground, *known[1:]) if with_soil else known
 
@@ -176,7 +176,7 @@ class SoilSpread:
         if not (layers := self._of_layers):
             return place
         kept = (*layers, None)[number % (len(layers) + 1)]
-        dropped = set(layers) if kept is None else {*layers, *_GROUND, *_HALF_WIDTHS} - {kept}
+        dropped = set(layers) if kept is None else {*layers, *OF_GROUND, *_HALF_WIDTHS} - {kept}
         return {name: value for name, value in place.items() if name not in dropped}
 
     def scale(self, name: str, place: Place) -> float:
@@ -207,7 +207,7 @@ class SoilSpread:
     def changes_ground(self, place: Place, *, layered: bool) -> bool:
         """Return whether the ground at a place has to be solved anew, as layers have for nu."""
         return any(name in place and getattr(self, name)
-                   for name in (*_GROUND, *(_HALF_WIDTHS if layered else ()))) or any(
+                   for name in (*OF_GROUND, *(_HALF_WIDTHS if layered else ()))) or any(
                        name in place for name in self._of_layers)
 
     def ground(

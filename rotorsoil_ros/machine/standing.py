@@ -37,7 +37,7 @@ class Below(Protocol):
 @dataclass(frozen=True)
 class OnBlocks:
     """
-    Rigid blocks on the ground; their places are the motions of each, six by six.
+    Rigid blocks on the ground, or a table of what the bearings stand on, which has no places.
 
     Attributes
     ----------
@@ -73,11 +73,11 @@ class OnBlocks:
 
         """
         support = self.support
-        blocks = self.receptance.motion(loads[None])
+        blocks = self.receptance.motion((support.place_rows.T @ loads)[None])
         if ground.any():
             follows = carrying(support.ground(self.omega), support.block_mass, self.omega)
             blocks = blocks + np.linalg.solve(follows, np.broadcast_to(
-                support.follow_rows @ ground, (len(follows), len(loads), ground.shape[1])))
+                support.follow_rows @ ground, (*follows.shape[:2], ground.shape[1])))
         return support.block_rows @ blocks, blocks
 
     def answered(
@@ -89,10 +89,12 @@ class OnBlocks:
         What enters the soil is the force at the seats, the load and the block's inertia; the
         compliance, which may be zero, is not inverted for it.
         """
-        arriving = self.support.block_rows.T @ at_seats
+        support = self.support
+        arriving = support.block_rows.T @ at_seats
         motion = pushed + self.receptance.motion(arriving)
-        inertia = self.omega[:, None, None] ** 2 * (self.support.block_mass @ motion)
-        return motion, arriving + loads + inertia
+        inertia = self.omega[:, None, None] ** 2 * (support.block_mass @ motion)
+        force = arriving + support.place_rows.T @ loads + inertia
+        return support.place_rows @ motion, support.force_rows @ force
 
 
 @dataclass(frozen=True)

@@ -8,20 +8,23 @@ import math
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray, side_by_side
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
-from rotorsoil_ros.ground.bed import as_one
+from rotorsoil_ros.ground.bed import as_one, below_patches
 from rotorsoil_ros.ground.soil import (
     below_each,
     SharedGround,
     SoilModel,
 )
+from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.flexible.part import FoundationPart, Mount
+from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
 from rotorsoil_ros.machine.foundation import BlockReceptance, Foundation
 from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 from rotorsoil_ros.machine.standing import Below, OnBlocks, OnBodies, Standing
 from rotorsoil_ros.rotor.bearing import Bearing
+from rotorsoil_ros.units import rad_s_to_hz
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,8 @@ class Support:
     foundations : sequence of Foundation
         The blocks.
     soil_models : sequence of SoilModel
-        The soil under each, or one `SharedGround` under all of them.
+        The soil under each, or one `SharedGround` under all of them; or one `SeatReceptance` of
+        the foundations and the ground below them, of which there are none then.
     place : Placement
         Where the shaft of the bearings lies.
 
@@ -52,6 +56,9 @@ class Support:
 
     def __post_init__(self) -> None:
         _ = self.soils
+        if self.foundations and self.table is not None:
+            raise RotorSoilError('foundations must be none on receptances of seats, which hold '
+                                 f'them, got {len(self.foundations)}')
         names = {foundation.name for foundation in self.foundations}
         for bearing in self.bearings:
             if bearing.foundation is not None and bearing.foundation not in names:
@@ -62,6 +69,12 @@ class Support:
     def soils(self) -> tuple[SoilModel, ...]:
         """What each block stands on, as if the others were not loaded."""
         return tuple(map(as_one, below_each(self.soil_models, len(self.foundations))))
+
+    @cached_property
+    def table(self) -> SeatReceptance | None:
+        """What stands for foundations and ground together, if anything does."""
+        first = self.soil_models[0] if len(self.soil_models) == 1 else None
+        return first if isinstance(first, SeatReceptance) else None
 
     @property
     def _shared(self) -> SharedGround | None:
@@ -74,7 +87,7 @@ class Support:
         if self._shared is not None:
             return self._shared.compliance(omega)
         found = [model.compliance(omega) for model in self.soil_models]
-        return _side_by_side(found, len(omega))
+        return side_by_side(found, len(omega))
 
     def points(self, omega: FloatArray) -> ComplexArray:
         """Return the motion of points on the ground per load of the blocks, (n, 3 p, 6 f)."""
@@ -84,7 +97,9 @@ class Support:
 
     @cached_property
     def members(self) -> tuple[FoundationPart, ...]:
-        """Every foundation by its points."""
+        """Every foundation by its points, or what stands for all of them."""
+        if self.table is not None:
+            return (FoundationPart.tabulated(self.table, self.mounts),)
         return tuple(FoundationPart.of(foundation, self.mounts)
                      for foundation in self.foundations)
 
@@ -96,12 +111,16 @@ class Support:
     @cached_property
     def firm_rows(self) -> FloatArray:
         """Motion per unit motion (x, y, z) of the ground, (2 b, 3), of what stands on no block."""
+        firm = self.table is None
         return np.concatenate([np.zeros((0, 3)), *(
-            mount.axes * (mount.bearing.foundation is None) for mount in self.mounts)])
+            mount.axes * (firm and mount.bearing.foundation is None) for mount in self.mounts)])
 
     @cached_property
     def follow_rows(self) -> FloatArray:
         """Motion of the contacts per unit motion (x, y, z) of the ground, (c, 3)."""
+        if self.table is not None:
+            raise RotorSoilError('receptances of seats do not tell how these follow ground that '
+                                 'moves: give foundation and ground')
         axes = [channel.axis for part in self.members for channel in part.contacts]
         return np.array([[float(axis == along) for along in DOFS[:3]]
                          for axis in axes]).reshape(-1, 3)
@@ -159,9 +178,10 @@ class Support:
         """Motion of seats, contacts and probes per rigid motion of all foundations, (p, 6 f)."""
         count = 2 * len(self.bearings) + sum(
             len(part.contacts) + len(part.probes) for part in self.members)
-        rows = np.zeros((count, 6 * len(self.members)))
-        for index, (part, own) in enumerate(zip(self.members, self.point_indices, strict=True)):
-            rows[own, 6 * index:6 * index + 6] = part.rows
+        rows, first = np.zeros((count, len(self.block_mass))), 0
+        for part, own in zip(self.members, self.point_indices, strict=True):
+            rows[own, first:first + len(part.mass)] = part.rows
+            first += len(part.mass)
         return rows
 
     def flexibility(self, omega: FloatArray) -> ComplexArray:
@@ -175,7 +195,8 @@ class Support:
     @cached_property
     def force_rows(self) -> FloatArray:
         """Force of the places that stand on the ground per force of the contacts."""
-        _, contacts = self._own_rows(lambda part: part.rows[part.places[1]].T)
+        _, contacts = self._own_rows(
+            lambda part: part.rows[part.places[1]].T[:len(part.mean)])
         return contacts
 
     @cached_property
@@ -188,9 +209,10 @@ class Support:
         self, whole: Callable[[FoundationPart], FloatArray],
     ) -> tuple[int, FloatArray]:
         """Return how many probes there are, and what of each whole contact and patch is told."""
-        wholes = scipy.linalg.block_diag(*(whole(part) for part in self.members))
-        patched = np.concatenate([np.full(len(part.contacts), part.is_patched)
-                                  for part in self.members])
+        wholes = scipy.linalg.block_diag(
+            np.zeros((0, 0)), *(whole(part) for part in self.members))
+        patched = np.concatenate([np.zeros(0, dtype=bool), *(
+            np.full(len(part.contacts), part.is_patched) for part in self.members)])
         probes = sum(len(part.probes) for part in self.members)
         return probes, np.concatenate([wholes, np.eye(self.contacts)[patched]])
 
@@ -311,8 +333,8 @@ class Support:
     def motion_compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of soils and pedestals without mass, (n, c, c)."""
         axes = np.array(self.pedestal_axes, dtype=int)
-        return _side_by_side([self.ground(omega), self.pedestals(omega)[:, axes[:, None], axes]],
-                             len(omega))
+        return side_by_side([self.ground(omega), self.pedestals(omega)[:, axes[:, None], axes]],
+                            len(omega))
 
     def answers(self, omega: float) -> bool:
         """Return whether every soil knows its compliance at a frequency [rad/s]."""
@@ -320,6 +342,32 @@ class Support:
             return bool(np.all(np.isfinite(self.motion_compliance(np.array([omega])))))
         except OutOfTableError:
             return False
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Between which frequencies files say what stands below [rad/s]; endless without one."""
+        rows = [one.omega for own in self.soil_models for one in below_patches(own)
+                if isinstance(one, (ComplianceTable, SeatReceptance))]
+        return (max((float(omega[0]) for omega in rows), default=0.0),
+                min((float(omega[-1]) for omega in rows), default=math.inf))
+
+    def within(self, span: tuple[float, float]) -> tuple[float, float]:
+        """
+        Return the part of a span of frequencies [rad/s] that files below hold.
+
+        Raises
+        ------
+        OutOfTableError
+            If they hold none of it.
+
+        """
+        low, high = max(span[0], self.reach[0]), min(span[1], self.reach[1])
+        if not low <= high:
+            raise OutOfTableError(
+                f'the file of the support must hold some of {rad_s_to_hz(span[0]):g} to '
+                f'{rad_s_to_hz(span[1]):g} Hz, got {rad_s_to_hz(self.reach[0]):g} to '
+                f'{rad_s_to_hz(self.reach[1]):g} Hz')
+        return low, high
 
     def known(self, highest: float) -> tuple[float, float]:
         """Return the part of 0 to `highest` [rad/s] for which every soil gives an answer."""
@@ -332,18 +380,7 @@ class Support:
                 inside, outside = (middle, outside) if known else (inside, middle)
             return inside
 
-        within = highest
+        within = min(highest, self.reach[1])
         while not self.answers(within) and within > 1e-6 * highest:
             within *= 0.5
         return edge(within, 0.0), edge(within, highest)
-
-
-def _side_by_side(found: Sequence[ComplexArray], count: int) -> ComplexArray:
-    """Return matrices (n, d, d) as the blocks of larger ones that nothing couples."""
-    sizes = [one.shape[-1] for one in found]
-    total = np.zeros((count, sum(sizes), sum(sizes)), dtype=complex)
-    place = 0
-    for one, size in zip(found, sizes, strict=True):
-        total[:, place:place + size, place:place + size] = one
-        place += size
-    return total

@@ -69,8 +69,9 @@ class Expectation:
         if band is not None and band.unstable:
             notes.append(band.unstable)
         low, high = (share * case.speed_range[1] for share in _LOOKED_FOR)
-        span = model.bearings.within_tables((min(low, case.speed_range[0] or low), high))
-        notes += clipped(span, (low, high))
+        span = model.support.within(model.bearings.within_tables(
+            (min(low, case.speed_range[0] or low), high)))
+        notes += clipped(model, span, (low, high))
         try:
             modes = critical_speeds(model, span)
         except NotSolvedError as error:

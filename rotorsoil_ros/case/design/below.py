@@ -13,6 +13,7 @@ from rotorsoil_ros.case.design.tables import (
 )
 from rotorsoil_ros.case.entries.sensors import site_around
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
+from rotorsoil_ros.case.entries.support_file import RECEPTANCE, TABLE
 from rotorsoil_ros.case.flexible.ground import bed_of, discs
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.bed import PatchesApart, WinklerBed
@@ -27,10 +28,13 @@ from rotorsoil_ros.ground.layers.model import LAYERS_ALGORITHM, ThinLayerModel
 from rotorsoil_ros.ground.soil import Contact, RigidSoil, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
 from rotorsoil_ros.machine.flexible.body import FlexibleBody, GROUNDED
+from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
 
 
 def soil_models(case: Case, cache: Cache) -> tuple[SoilModel, ...]:
     """Return the model under each foundation, or one under all of them, as `coupled_model`."""
+    if case.support.model == RECEPTANCE:
+        return case.tables
     bends = any(block.body is not None for block in case.foundations)
     if case.support.model == BOUNDARY_ELEMENTS and case.soil is not None and not bends:
         site = site_of(case.foundations, case.ground_probes)
@@ -64,7 +68,7 @@ def _below(case: Case, index: int, contact: Contact, cache: Cache) -> SoilModel:
     """Return the ground under one contact alone."""
     if case.support.model == 'rigid':
         return RigidSoil()
-    if case.support.model == 'table':
+    if case.support.model == TABLE:
         return case.tables[index]
     if case.soil is None:
         raise InputError(f'{case.path}: soil: is missing')
@@ -125,4 +129,6 @@ def identity(model: SoilModel) -> object:
         return ['site on layers', model.ground, model.site, key_of(model)]
     if isinstance(model, ComplianceTable):
         return ['table', model.omega, model.values, *model.cut_offs, *model.branch_points]
+    if isinstance(model, SeatReceptance):
+        return ['seats', model.omega, model.values, *model.seats]
     return model

@@ -12,6 +12,7 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case import models
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.design.inputs import input_of, UncertainInput
+from rotorsoil_ros.case.entries.support_file import FILED
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.accuracy import gap
 from rotorsoil_ros.ground.plan import Part, Plan
@@ -154,9 +155,9 @@ def on_larger_blocks(case: Case, directory: Path, factor: float) -> CoupledModel
         If nobody knows such a machine; the reason continues a sentence.
 
     """
-    if case.support.model in ('rigid', 'table'):
+    if case.support.model in ('rigid', *FILED):
         raise RotorSoilError('the support is rigid' if case.support.model == 'rigid' else
-                             'the table of the support knows the contact of this one only')
+                             'the file of the support knows this one only')
     for block in case.foundations:
         if block.body is not None:
             raise RotorSoilError(f'{block.name} bends, and its file tells of this size only')

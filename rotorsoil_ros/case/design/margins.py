@@ -99,14 +99,14 @@ def near_modes(model: CoupledModel, running: float) -> NearModes:
     for low, high in (*((low * running, high * running) for low, high in _REACHES),
                       asked(running)):
         try:
-            span = model.bearings.within_tables((low, high))
+            span = model.support.within(model.bearings.within_tables((low, high)))
             found = critical_speeds(model, span)
         except (NotSolvedError, OutOfTableError) as error:
             doubt = f'critical speeds of the model are not known: {error}'
             continue
         least, most = asked(running)
         needed = max(least, low), min(most, high)
-        short = clipped(span, needed)
+        short = clipped(model, span, needed)
         return NearModes(tuple(separation_margins(model, found, running)), span,
                          '; '.join(short))
     return NearModes((), (running, running), doubt)

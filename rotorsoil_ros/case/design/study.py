@@ -18,6 +18,8 @@ from rotorsoil_ros.case.design.margins import near_modes
 from rotorsoil_ros.case.design.report import DesignReport, HousingAnswer
 from rotorsoil_ros.case.design.rigidity import of_rigidity
 from rotorsoil_ros.case.design.shapes import shape_errors
+from rotorsoil_ros.case.entries.support_file import FILED
+from rotorsoil_ros.case.flexible.words import seats_told
 from rotorsoil_ros.case.zone_limits import RIGID_MARGIN, support_class
 from rotorsoil_ros.channel import across, Channel, HOUSING
 from rotorsoil_ros.errors import InputError, NotSolvedError, RotorSoilError
@@ -133,9 +135,10 @@ def _together(
 def _assumptions(machine: 'Machine') -> Iterator[str]:
     case = machine.case
     ground = case.support.model.replace('_', ' ')
-    yield f'ground: {ground}' + ('' if case.soil is None else (
+    below = list(seats_told(case)) or [('ground', ground + ('' if case.soil is None else (
         f', c_s {case.soil.shear_wave_speed:.4g} m/s, nu {case.soil.poisson_ratio:g}, '
-        f'{case.soil.density:g} kg/m^3'))
+        f'{case.soil.density:g} kg/m^3')))]
+    yield from map(': '.join, below)
     shapes = shape_errors(case, machine.model.support.soils, machine.directory)
     for block, shape in zip(case.foundations, shapes, strict=True):
         if told := model_error(case, block, shape):
@@ -159,7 +162,7 @@ _LEFT_OUT = {
 
 
 def _not_modelled(case: Case) -> Iterator[str]:
-    if case.support.model != 'table':
+    if case.support.model not in FILED:
         said = str(case.content)
         yield from (words for key, words in _LEFT_OUT.items() if f"'{key}'" not in said)
     yield 'vibration that is not once per turn (velocities are a lower bound of broadband rms)'

@@ -8,6 +8,7 @@ from typing import Any
 from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, HIGHEST_ORDER
+from rotorsoil_ros.case.entries.support_file import RECEPTANCE
 from rotorsoil_ros.errors import require, RotorSoilError
 from rotorsoil_ros.ground.embedded_cone import require_whole_wall
 from rotorsoil_ros.ground.green import LEAST_LOSS
@@ -22,10 +23,14 @@ from rotorsoil_ros.ground.layers.profile import (
     SURFACE,
 )
 from rotorsoil_ros.ground.soil import Contact, Soil
-from rotorsoil_ros.machine.spread import OF_LAYER, SoilSpread
+from rotorsoil_ros.machine.spread import OF_GROUND, OF_LAYER, SOIL_INPUTS, SoilSpread
 
 # The support that knows layers and walls in the ground.
 THIN_LAYERS = 'thin_layers'
+
+# What receptances of seats leave no choice of.
+_IN_SEATS = {*SOIL_INPUTS, *OF_GROUND, OF_LAYER, 'foundation_mass_factor',
+             'foundation_stiffness_factor', 'shaft_height_factor'}
 
 # Why cones are not offered on layers.
 _CONES_ON_ROCK = ('cones on rock miss its resonance by a factor of up to 2.3 and radiate where '
@@ -135,6 +140,9 @@ class GroundEntries:
         entries, support = self.faults.entries, self.faults.entries.support
         if support.model == 'rigid':
             return
+        if support.model == RECEPTANCE:
+            self._refuse_beside_seats()
+            return
         if entries.soil is None and support.model != 'table':
             raise self.faults.error('soil', problem='is missing; the support model '
                                                     f'{support.model} needs it')
@@ -157,6 +165,22 @@ class GroundEntries:
         if not entries.foundations:
             raise self.faults.error('foundations', problem='is missing; the support model '
                                                            f'{support.model} needs a block')
+
+    def _refuse_beside_seats(self) -> None:
+        """Raise an InputError at what receptances of seats hold already."""
+        entries, support = self.faults.entries, self.faults.entries.support
+        if self.faults.under:
+            raise self.faults.error('support', 'model', problem=(
+                f'must be one of blocks on ground where several machines share them, got '
+                f'{RECEPTANCE}, which is of the seats of one machine'))
+        if entries.foundations:
+            names = ', '.join(block.name for block in entries.foundations)
+            raise self.faults.error('foundations', problem=(
+                f'must be empty with the support model {RECEPTANCE}, whose file holds foundation '
+                f'and ground, got {names}'))
+        if support.geometry != 'disc':
+            raise self.faults.error('support', 'geometry', problem=(
+                f'must be disc for the model {RECEPTANCE}, got {support.geometry}'))
 
     def refuse_unfit_bed(self) -> None:
         """Raise an InputError where the ground cannot stand below what bends."""
@@ -205,6 +229,13 @@ class GroundEntries:
         """Raise an InputError where there is no such ground as that which may be there."""
         entries = self.faults.entries
         if entries.uncertainty is None:
+            return
+        if entries.support.model == RECEPTANCE:
+            for name in sorted(entries.uncertainty.model_fields_set & _IN_SEATS):
+                given = getattr(entries.uncertainty, name)
+                self.faults.found.append(self.faults.error('uncertainty', name, problem=(
+                    f'must not be given with the support model {RECEPTANCE}: its file holds '
+                    f'foundation and ground as they are, got {given}')))
             return
         if (entries.uncertainty.layer_stiffness_factor is not None
                 and not isinstance(entries.soil, schema.LayersEntry)):

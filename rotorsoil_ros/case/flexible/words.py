@@ -8,6 +8,7 @@ from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.flexible.entries import LEAST_REACH
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.machine.flexible.body import FlexibleBody, GROUNDED
+from rotorsoil_ros.machine.flexible.receptance import NOT_WORTH_A_WORD, SeatReceptance
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import rad_s_to_hz
 
@@ -109,3 +110,39 @@ def _odd_shapes(index: int, body: FlexibleBody) -> Iterator[str]:
         yield (f'foundations.{index}.flexible.modes: shapes of the lowest mode reach '
                f'{beside:.3g} times one over the root of the mass, which is about 2 of a slab: '
                'are they of unit modal mass, in kg?')
+
+
+def seats_told(case: Case) -> Iterator[tuple[str, str]]:
+    """Yield what a file of receptances says of foundation and ground."""
+    for table in case.tables:
+        if not isinstance(table, SeatReceptance):
+            continue
+        low, high = (rad_s_to_hz(float(end)) for end in (table.omega[0], table.omega[-1]))
+        yield 'foundation and ground', (
+            f'receptances of {len(table.seats)} motions of the seats at {len(table.omega)} '
+            f'frequencies from {low:.4g} to {high:.4g} Hz; outside nothing is known, loads of '
+            'bearings at rest need none of it; ' + (
+                f'all follow one law within {table.missed:.1g} of a row' if table.law is not None
+                else 'a curve leads through measured ones, with noise of about '
+                     f'{table.missed:.1%} of a row'))
+        if max(table.skew, table.given) > NOT_WORTH_A_WORD:
+            yield 'foundation and ground: taken out', (
+                f'mirror images differed by up to {table.skew:.2g} of a row, and up to '
+                f'{table.given:.2g} of one gave energy')
+
+
+def of_seats(case: Case) -> Iterator[str]:
+    """Yield what looks odd about a file of receptances and the bearings on it."""
+    for table in case.tables:
+        if not isinstance(table, SeatReceptance):
+            continue
+        if table.apart:
+            count = len(table.seats)
+            yield (f'support.file: {table.apart} of the {count * (count - 1) // 2} pairs of '
+                   'motions are not there: a force at one is taken not to move the other, which '
+                   'no block does')
+        for index, bearing in enumerate(case.rotor.bearings):
+            if bearing.pedestal is not None:
+                yield (f'rotor.bearings.{index}.pedestal: stands on the seat of support.file; '
+                       'receptances that `seats` writes, or of a test on the housing, hold the '
+                       'pedestal already')

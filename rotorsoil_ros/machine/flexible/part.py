@@ -11,6 +11,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.machine.flexible.body import FlexibleBody, massless, PROBE
+from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.rotor.bearing import Bearing
@@ -87,9 +88,9 @@ class FoundationPart:
     probes : tuple of Channel
         Other motions that are asked for.
     mass : (6, 6) float array
-        Of the rigid body about the middle of its contact.
+        Of the rigid body about the middle of its contact; of a table none, over its motions.
     rows : (p, 6) float array
-        Motion of the points per rigid motion about there.
+        Motion of the points per rigid motion about there, or per motion of a table.
     shapes : (p, m) float array
         Of its elastic modes.
     stiffness : (m,) complex array
@@ -99,7 +100,7 @@ class FoundationPart:
     residual_loss : float
         Loss factor of the rest.
     mean : (6, c) float array
-        Mean motion of the contact per motion of the contacts.
+        Mean motion of the contact per motion of the contacts; nothing of a table.
 
     """
 
@@ -152,6 +153,26 @@ class FoundationPart:
                    residual[:, loaded] @ np.linalg.pinv(springs).T,
                    body.residual_loss, body.mean_rows)
 
+    @classmethod
+    def tabulated(cls, table: SeatReceptance, mounts: Sequence['Mount']) -> 'FoundationPart':
+        """
+        Return what a table of receptances is to bearings: contacts without mass, one per motion.
+
+        Raises
+        ------
+        RotorSoilError
+            If the table does not know a bearing.
+
+        """
+        own = [row for mount in mounts
+               for row in table.rows_of(mount.bearing.seat or mount.bearing.name)]
+        count = len(table.seats)
+        points = np.concatenate([np.eye(count)[own], np.eye(count)])
+        return cls(tuple(range(len(own))), table.seats, (), np.zeros((count, count)), points,
+                   np.zeros((len(points), 0)), np.zeros(0, dtype=complex),
+                   np.zeros((len(points),) * 2, dtype=complex), np.zeros((len(points), 0)), 0.0,
+                   np.zeros((0, count)))
+
     @property
     def places(self) -> tuple[slice, slice, slice]:
         """Where among the points seats, contacts and probes are."""
@@ -161,8 +182,8 @@ class FoundationPart:
     @property
     def is_patched(self) -> bool:
         """Whether it stands on several contacts."""
-        return len(self.contacts) != len(DOFS) or self.contacts[0].station != (
-            self.contacts[-1].station)
+        return len(self.mean) > 0 and (len(self.contacts) != len(DOFS) or (
+            self.contacts[0].station != self.contacts[-1].station))
 
     def flexibility(self, omega: FloatArray) -> ComplexArray:
         """Return the elastic motion of the points per force on them, (n, p, p) [m/N]."""
@@ -199,7 +220,7 @@ class FoundationPart:
         turn = (_free_on_patches(self.rows[contact], elastic[contact], self.mass, inertia)
                 if self.is_patched else _free_on_one(self.rows[contact], elastic[contact]))
         mass = turn.T @ scipy.linalg.block_diag(self.mass, np.diag(inertia)) @ turn
-        part = turn[6:]
+        part = turn[len(self.mass):]
         own = len(self.contacts)
         spring = part.T @ ((1.0 + 1j * loss)[:, None] * part)
         # The elastic coordinates' own unit springs belong to the compliance.
@@ -231,7 +252,7 @@ class ContactForm:
 def _free_on_one(rows: FloatArray, elastic: FloatArray) -> FloatArray:
     """Return rigid and elastic motion per motion of one contact and elastic motion."""
     inverse, count = np.linalg.inv(rows), elastic.shape[1]
-    return np.block([[inverse, -inverse @ elastic], [np.zeros((count, 6)), np.eye(count)]])
+    return np.block([[inverse, -inverse @ elastic], [np.zeros((count, len(rows))), np.eye(count)]])
 
 
 def _free_on_patches(

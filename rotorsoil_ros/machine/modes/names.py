@@ -28,6 +28,10 @@ _MASSLESS = 1e-9
 # Cosine from which two rotors move together, and share of the largest from which one takes part.
 _TOGETHER, _TAKES_PART = 0.5, 0.5
 
+# Foundation and ground where nothing tells them apart; step of frequency, of itself.
+BELOW = 'foundation and ground'
+_STEP = 1e-4
+
 
 @dataclass(frozen=True)
 class _Bending:
@@ -122,7 +126,7 @@ class ModeNames:
 
         """
         energies = (self._in_soil(support, frequency) | self._in_pedestals(support)
-                    | self._in_foundations(support))
+                    | self._in_foundations(support) | self._in_table(support, frequency))
         of_rotors = {
             'shaft': [own.energy(deflection) for own, deflection in zip(
                 self._rotors, deflections, strict=True)],
@@ -197,7 +201,7 @@ class ModeNames:
     def _in_foundations(self, support: ComplexArray) -> dict[str, float]:
         """Return the energy that each foundation stores by bending."""
         found, below = {}, self.model.support
-        for block, own in zip(self.model.foundations, below.motions, strict=True):
+        for block, own in zip(self.model.foundations, below.motions, strict=False):
             if block.body is not None:
                 part = support[own]
                 spring = below.motion_spring[np.ix_(own, own)].real
@@ -205,6 +209,26 @@ class ModeNames:
                 found[f'{block.name} bending'] = float(
                     np.vdot(part, spring @ part).real + np.vdot(elastic, elastic).real)
         return found
+
+    def _in_table(self, support: ComplexArray, frequency: float) -> dict[str, float]:
+        """
+        Return the energy that foundation and ground store where receptances tell of both.
+
+        Of a dynamic stiffness S that masses and springs make up, x^H (S - w S' / 2) x is what the
+        springs store.
+        """
+        table = self.model.support.table
+        if table is None:
+            return {}
+        low, high = table.omega[[0, -1]]
+        omega = np.clip(frequency, (1.0 + _STEP) * low, (1.0 - _STEP) * high) * np.array(
+            [1.0 - _STEP, 1.0 + _STEP])
+        moving = np.flatnonzero(table.values.any(axis=(0, 1)))
+        motion, gives = support[moving], table.compliance(omega)[:, moving[:, None], moving]
+        force = np.linalg.solve(gives, np.broadcast_to(motion[:, None], (2, len(moving), 1)))
+        below, above = (motion.conj() @ force[..., 0].T).real.tolist()
+        slope = (above - below) / (2.0 * _STEP)
+        return {BELOW: abs(0.5 * (below + above) - 0.5 * slope)}
 
     def _in_pedestals(self, support: ComplexArray) -> dict[str, float]:
         found, place = {}, self.model.support.contacts

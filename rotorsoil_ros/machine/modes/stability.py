@@ -33,6 +33,9 @@ _STEPS = 60
 # Modes are looked for this far above what could grow at most: the bound itself is then inside.
 _ABOVE = 1.2
 
+# Why nothing is known below: bearings, or the support.
+_BELOW = 'tables of bearings begin there', 'the file of the support begins there'
+
 
 @dataclass(frozen=True, slots=True)
 class Instability:
@@ -82,7 +85,9 @@ class Stability:
         Frequencies above and below which a mode could grow but is not known [rad/s]; infinite and
         zero where everything is known.
     untold_why : str
-        Why not above; below it is that tables of bearings begin there.
+        Why not above.
+    why_below : str
+        Why not below.
     doubt : str
         Why nothing is known; empty if it is.
 
@@ -95,6 +100,7 @@ class Stability:
     doubt: str = ''
     untold_below: float = 0.0
     untold_why: str = ''
+    why_below: str = ''
 
     def to_json(self) -> str:
         """Return everything as one line of text."""
@@ -172,8 +178,9 @@ def stability(model: CoupledModel, span: tuple[float, float]) -> Stability:
         found = list(_instabilities(pencil, samples))
     above, why = _untold(model, pencil, (low, high), bound, wanted)
     return Stability((low, high), tuple(sorted(found, key=lambda one: (one.low, one.frequency))),
-                     min(wanted, pencil.solver.span[1]), above,
-                     untold_below=max(model.bearings.frequency_range[0], 0.0), untold_why=why)
+                     min(wanted, pencil.solver.span[1]), above, untold_why=why,
+                     untold_below=max(model.bearings.frequency_range[0], model.support.reach[0]),
+                     why_below=_BELOW[model.support.reach[0] > model.bearings.frequency_range[0]])
 
 
 def _untold(
