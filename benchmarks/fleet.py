@@ -4,9 +4,10 @@ Measure a node that watches fifty machines: how it starts, and what a message co
 Cold start: fifty cases on three kinds of soil, infinite elements, empty cache. Then as many
 machines in one node process, reliable, each at 10 Hz, against one machine at the same number of
 messages per second, and against a bare node with the same topics, in turns: latency, what was
-lost, CPU time per message, resident memory.
+lost, CPU time per message, resident memory. With plants, two of the machines are those of each.
 
-    python -m benchmarks.fleet [--machines N] [--rate HZ] [--seconds S] [--rounds N] [--no-start]
+    python -m benchmarks.fleet [--machines N] [--plants N] [--rate HZ] [--seconds S] [--rounds N]
+                               [--no-start]
 """
 
 import argparse
@@ -31,6 +32,8 @@ from rotorsoil_ros.case.loading import load_all
 
 from benchmarks.node import BARE, cpu_seconds, process, resident_mib
 
+FASTEST = 700.0  # rad/s, of a machine of its own
+OF_PLANT = 0.2  # of that speed; those of the shipped plant turn slower
 CASE = Path(__file__).resolve().parents[1] / 'config' / 'paper_rotor.yaml'
 POISSON_RATIOS = (0.25, 0.35, 0.45)
 DOMAIN = '56'
@@ -69,18 +72,19 @@ def start_cold(directory: Path, count: int) -> None:
 class Driver:
     """Speaks for machines in turn and hears all answers, both as bytes."""
 
-    def __init__(self, machines: int) -> None:
+    def __init__(self, names: list[str]) -> None:
         self.context = Context()
         rclpy.init(context=self.context)
         self.node = Node('fleet_driver', context=self.context)
         self.latencies: list[int] = []
-        self.heard = [0] * machines
+        self.heard = [0] * len(names)
         self.publishers = []
-        for number in range(machines):
+        self._share = [OF_PLANT if '/' in name else 1.0 for name in names]
+        for number, name in enumerate(names):
             self.publishers.append(self.node.create_publisher(
-                JointState, f'machine_{number}/joint_states', RELIABLE))
+                JointState, f'{name}/joint_states', RELIABLE))
             self.node.create_subscription(
-                JointState, f'rotorsoil/machine_{number}/amplitude',
+                JointState, f'rotorsoil/{name}/amplitude',
                 lambda data, number=number: self._on_answer(number, data), RELIABLE, raw=True)
         self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
@@ -103,7 +107,7 @@ class Driver:
         """Tell the speed of one machine, stamped with the monotonic clock."""
         now = time.monotonic_ns()
         struct.pack_into('<iI', self._bytes, 4, now // 1_000_000_000, now % 1_000_000_000)
-        struct.pack_into('<d', self._bytes, self._speed_at, speed)
+        struct.pack_into('<d', self._bytes, self._speed_at, self._share[number] * speed)
         self.publishers[number].publish(bytes(self._bytes))
 
     def wait(self) -> None:
@@ -128,7 +132,7 @@ class Driver:
         """Speak for all machines in turn; return latencies [us] and how many were not answered."""
         self.latencies.clear()
         count, start = int(rate_hz * seconds), time.monotonic()
-        speed = 400.0 + 300.0 * np.sin(np.arange(count) / count * 20.0)
+        speed = FASTEST * (4.0 + 3.0 * np.sin(np.arange(count) / count * 20.0)) / 7.0
         for index in range(count):
             while (left := start + index / rate_hz - time.monotonic()) > 0.0:
                 self.executor.spin_once(timeout_sec=left)
@@ -145,19 +149,28 @@ def bare(names: list[str], directory: Path) -> list[str]:
 
 def ours(names: list[str], directory: Path) -> list[str]:
     """Return the command of the node that watches these machines."""
+    entries = dict.fromkeys(name.partition('/')[0] for name in names)
     command = [sys.executable, '-m', 'rotorsoil_ros.node.node', '--ros-args',
-               '-p', f'machines:=[{",".join(names)}]', '-p', 'speed_reliability:=reliable',
+               '-p', f'machines:=[{",".join(entries)}]', '-p', 'speed_reliability:=reliable',
                '-p', 'speed_depth:=100', '-p', f'cache:={directory / "cache"}']
-    for name in names:
-        command += ['-p', f'{name}.case:={CASE}']
+    for entry in entries:
+        command += ['-p', f'{entry}.case:={CASE if entry in names else "fan_house"}']
     return command
 
 
-def measure(command: list[str], machines: int, rate_hz: float, seconds: float) -> list[float]:
+def names_of(machines: int, plants: int) -> list[str]:
+    """Return how machines are called, those of plants first."""
+    among = [f'plant_{number}/fan_{one}' for number in range(plants) for one in (1, 2)]
+    return [*among, *(f'machine_{number}' for number in range(machines - len(among)))]
+
+
+def measure(
+    command: list[str], names: list[str], rate_hz: float, seconds: float,
+) -> list[float]:
     """Return median and 99th percentile [us], losses, CPU per message [us], memory [MiB]."""
     with ExitStack() as stack:
         running = stack.enter_context(process(command))
-        driver = Driver(machines)
+        driver = Driver(names)
         stack.callback(driver.close)
         driver.wait()
         before = cpu_seconds(running.pid)
@@ -182,6 +195,7 @@ def main() -> None:
     """Measure the start, then one machine and many in turns."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--machines', type=int, default=50)
+    parser.add_argument('--plants', type=int, default=0, help='of two machines each')
     parser.add_argument('--rate', type=float, default=10.0, help='of each machine [Hz]')
     parser.add_argument('--seconds', type=float, default=20.0)
     parser.add_argument('--rounds', type=int, default=2)
@@ -196,10 +210,10 @@ def main() -> None:
         runs: dict[tuple[str, int], list[list[float]]] = {}
         for _ in range(arguments.rounds):
             for machines in (1, arguments.machines):
-                names = [f'machine_{number}' for number in range(machines)]
+                names = names_of(machines, 0 if machines == 1 else arguments.plants)
                 for node in (bare, ours):
                     runs.setdefault((node.__name__, machines), []).append(measure(
-                        node(names, directory), machines,
+                        node(names, directory), names,
                         arguments.rate * arguments.machines, arguments.seconds))
         report(runs)
 

@@ -71,6 +71,19 @@ def test_parameters_are_named_without_the_machine(rotorsoil_twin):
     assert twin.amplitude.receive()['disc_1_x'] > 0.0
 
 
+def test_machines_of_a_plant_are_asked_by_their_names(rotorsoil_twin):
+    twin = rotorsoil_twin('fan_house', parameters={'fan_2.speed.unit': 'rpm'})
+    total = twin.hear('total')
+    twin['fan_1'].speed.send(rad_s=150.0)
+    own = twin['fan_1'].amplitude.receive()
+    np.testing.assert_allclose(
+        total.receive().message.position, own.message.position, rtol=1e-12)
+    twin['fan_2'].speed.send(rad_s=1400.0)  # which it takes for rpm
+    assert twin['fan_2'].velocity_rms.receive().velocity('fan_2_fan_end_housing_x') > 0.0
+    with pytest.raises(RotorSoilError, match=r"is a plant: .* twin\['fan_1'\]"):
+        twin.speed.send(rpm=1480)
+
+
 def test_a_node_of_the_package_under_test_takes_part(rotorsoil_twin):
     twin = rotorsoil_twin()
     other = twin.add(Node('mine', context=twin.context))

@@ -14,7 +14,7 @@ from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.profile import Profile
 from rotorsoil_ros.wire.cdr import ARRAYS
-from rotorsoil_ros.wire.definitions import IMU, JOINT_STATE
+from rotorsoil_ros.wire.definitions import DIAGNOSTICS, IMU, JOINT_STATE
 from rotorsoil_ros.wire.handlers import ground_sensor, OIL_TOPIC, raw_channel, SPEED_TOPICS, TOPICS
 from rotorsoil_ros.wire.messages import (
     JointStateWriter,
@@ -218,7 +218,7 @@ def candidates(sources: Iterable[Source]) -> str:
     """Say which topics hold a number that could be a speed, if one were told which."""
     found = [f'{source.topic} ({source.type})' for source in sources
              if source.encoding == CDR and not next(_names(source.topic), '')
-             and source.type not in OWN_TOPICS.values()
+             and source.type not in (*OWN_TOPICS.values(), DIAGNOSTICS)
              and source.definition and not USUAL.fits(source.type, source.definition)]
     return f'; numbers are on {", ".join(found[:MOST_TOLD])}' if found else ''
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from rotorsoil_ros.case.config import Case
@@ -12,6 +11,7 @@ from rotorsoil_ros.screen.bode import Bode
 from rotorsoil_ros.screen.channels import (
     BLOCK,
     DISCS,
+    entity_of,
     HOUSINGS,
     JOURNALS,
     moving_housings,
@@ -46,7 +46,7 @@ class Shown:
 
     def entity(self, *parts: str) -> str:
         """Return the path of something that belongs to it."""
-        return rr.new_entity_path([self.name, *parts])
+        return entity_of(self.name, *parts)
 
     @property
     def housings(self) -> list[Trend]:

@@ -66,9 +66,14 @@ def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]
         # Patches and probes of a foundation that bends have names of their own.
         kind = _kind(channel, owners.get(channel.station, BLOCK))
         colour = CHANNEL_COLOURS[sum(trend.kind == kind for trend in shown) % len(CHANNEL_COLOURS)]
-        entity = rr.new_entity_path([machine, channel.station, channel.motion])
+        entity = entity_of(machine, channel.station, channel.motion)
         shown.append(Trend(channel, kind, entity, colour))
     return shown
+
+
+def entity_of(machine: str, *parts: str) -> str:
+    """Return the path of something of a machine; one of a plant stands below it."""
+    return rr.new_entity_path([*machine.split('/'), *parts])
 
 
 def _kind(channel: Channel, kind_of_owner: str) -> str:

@@ -11,7 +11,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.zone_limits import support_class, ZoneLimits
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Band, Compared, NANOSECONDS, Zoned
-from rotorsoil_ros.screen.channels import HOUSINGS, MICRO, Trend
+from rotorsoil_ros.screen.channels import entity_of, HOUSINGS, MICRO, Trend
 from rotorsoil_ros.screen.recording import Recording, TREND_NS
 from rotorsoil_ros.units import rad_s_to_rpm
 
@@ -54,7 +54,7 @@ class TrendLines:
             return
         stamps, speed, displacement = stamp_ns[rows], speed[rows], displacement[rows]
         self._recording.series(
-            rr.new_entity_path([self._machine, 'speed']), stamps, rad_s_to_rpm(speed),
+            entity_of(self._machine, 'speed'), stamps, rad_s_to_rpm(speed),
             style=rr.SeriesLines(names=self._machine, colors=(210, 210, 210)))
         for number, trend in enumerate(self._trends):
             found = displacement[:, number]
@@ -142,8 +142,7 @@ class TrendLines:
                 [zones.of(support_class(lowest, each), abs(each))
                  for each in speed[rows].tolist()])
             for number, (name, colour) in enumerate(LIMITS.items()):
-                entity = rr.new_entity_path(
-                    [self._machine, 'limits', axis, name.replace('/', '_')])
+                entity = entity_of(self._machine, 'limits', axis, name.replace('/', '_'))
                 self._recording.series(
                     entity, stamp_ns[rows], bounds[:, number], style=rr.SeriesLines(
                         names=f'limit {name}', colors=colour, widths=1.0,

@@ -103,9 +103,9 @@ class Speed:
 class Heard:
     """A topic of answers, as a test waits for them."""
 
-    def __init__(self, twin: 'Twin', name: str) -> None:
-        self._twin, self._name = twin, name
-        self._messages = twin.graph.hear(f'{twin.answers}/{name}', JointState)
+    def __init__(self, twin: 'Twin', topic: str) -> None:
+        self._twin, self._name = twin, topic.rpartition('/')[2]
+        self._messages = twin.graph.hear(topic, JointState)
         self._taken = 0
 
     def __len__(self) -> int:
@@ -127,9 +127,21 @@ class Heard:
         return [TwinAnswer(message) for message in self._messages]
 
 
+class Watched:
+    """One machine, as a test speaks to it and hears of it."""
+
+    def __init__(self, twin: 'Twin', name: str) -> None:
+        answers = f'{twin.node.get_fully_qualified_name()}/{name}'
+        self.speed = Speed(twin.graph, f'/{name}/joint_states')
+        self.amplitude, self.phase, self.velocity_rms = (
+            Heard(twin, f'{answers}/{told}') for told in ('amplitude', 'phase', 'velocity_rms'))
+
+
 class Twin:
     """
-    A node that watches one machine in a graph of its own, active when it is returned.
+    A node that watches a machine or a plant in a graph of its own, active when it is returned.
+
+    `twin.speed`, `twin.amplitude`... are those of the machine, of a plant `twin['fan_1'].speed`...
 
     Parameters
     ----------
@@ -140,7 +152,8 @@ class Twin:
     case : Path or str
         Its case file, or the name of a shipped case.
     parameters : mapping
-        Of the node; those of the machine without its name, as in `speed.unit`.
+        Of the node; those of the machine without its name, as in `speed.unit`, of a plant
+        `fan_1.speed.unit`.
 
     """
 
@@ -150,8 +163,8 @@ class Twin:
         self.graph, self.machine = graph, machine
         values = {'machines': [machine], f'{machine}.case': str(case), 'speed_depth': 1000,
                   'speed_reliability': 'reliable', 'log.rerun': False}
-        values |= {f'{machine}.{name}' if name in OF_MACHINE else name: value
-                   for name, value in parameters.items()}
+        values |= {f'{machine}.{name}' if {name, name.partition('.')[2]} & OF_MACHINE.keys()
+                   else name: value for name, value in parameters.items()}
         others = sum(isinstance(node, RotorsoilNode) for node in graph.nodes)
         renamed = ['--ros-args', '-r', f'__node:={NODE_NAME}_{others + 1}'] if others else []
         self.node = graph.add(RotorsoilNode(
@@ -161,10 +174,46 @@ class Twin:
             raise RotorSoilError(f'{machine}: the node did not start; it says why above')
         self.answers = f'{self.node.get_fully_qualified_name()}/{machine}'
         self._diagnostics = graph.hear('/diagnostics', DiagnosticArray)
-        self.speed = Speed(graph, f'/{machine}/joint_states')
-        self.amplitude, self.phase = Heard(self, 'amplitude'), Heard(self, 'phase')
-        self.velocity_rms = Heard(self, 'velocity_rms')
+        self._machines = {name.rpartition('/')[2]: Watched(self, name)
+                          for name in self.node.settings.files[machine]}
         graph.settle()
+
+    def __getitem__(self, name: str) -> Watched:
+        """Return one machine of a plant."""
+        return self._machines[name]
+
+    @property
+    def speed(self) -> Speed:
+        """The speed topic of the machine."""
+        return self._only.speed
+
+    @property
+    def amplitude(self) -> Heard:
+        """Answers: amplitudes."""
+        return self._only.amplitude
+
+    @property
+    def phase(self) -> Heard:
+        """Answers: phases."""
+        return self._only.phase
+
+    @property
+    def velocity_rms(self) -> Heard:
+        """Answers: what zones judge."""
+        return self._only.velocity_rms
+
+    @property
+    def _only(self) -> Watched:
+        if self.machine not in self._machines:
+            names = ', '.join(f'twin[{name!r}]' for name in self._machines)
+            raise RotorSoilError(f'{self.machine} is a plant: ask one of its machines, {names}')
+        return self._machines[self.machine]
+
+    def hear(self, name: str) -> Heard:
+        """Return what comes on another topic of JointStates below the name, as `total`."""
+        heard = Heard(self, f'{self.answers}/{name}')
+        self.graph.settle()
+        return heard
 
     @property
     def context(self) -> Any:

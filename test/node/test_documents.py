@@ -6,7 +6,9 @@ import re
 
 import yaml
 
-from rotorsoil_ros.node.parameters import OF_MACHINE, OWN
+from rotorsoil_ros.case.document import located
+from rotorsoil_ros.case.plant.together import sources_of
+from rotorsoil_ros.node.parameters import OF_MACHINE, of_unbalance, OWN
 from rotorsoil_ros.wire.handlers import TOPICS
 from rotorsoil_ros.wire.messages import OWN_TOPICS
 
@@ -46,12 +48,17 @@ def test_the_example_of_parameters_names_only_parameters_of_the_node():
     example = yaml.safe_load((ROOT / 'launch' / 'rotorsoil.yaml').read_text())
     given = example['/**']['ros__parameters']
     machines = {name: given.pop(name) for name in given['machines']}
+    plant = machines.pop('fan_house')
+    machines |= {name: plant.pop(name) for name in sources_of(located(Path(plant.pop('case'))))}
+    assert not plant
     for name, value in given.items():
         if isinstance(value, dict):
             assert all(not OWN[f'{name}.{key}'].fault(entry) for key, entry in value.items())
         else:
             assert not OWN[name].fault(value)
     for machine in machines.values():
+        for disc in machine.pop('unbalance', {}).values():
+            assert not any(of_unbalance(0j)[key].fault(value) for key, value in disc.items())
         speed = {f'speed.{name}': value for name, value in machine.pop('speed', {}).items()}
         assert all(not OF_MACHINE[name].fault(value)
                    for name, value in {**machine, **speed}.items())
