@@ -11,11 +11,15 @@ from std_srvs.srv import Trigger
 import yaml
 
 import rotorsoil_ros as rs
+from rotorsoil_ros.bags import reader as bag_reader
+from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.case import document
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import Plant
 from rotorsoil_ros.units import rad_s_to_rpm
 
 from graphs import joint_state, STAMP, stamp_ns
+from records import topics_of
 
 CONFIG = Path(__file__).parents[2] / 'config'
 HOUSE = CONFIG / 'fan_house.yaml'
@@ -96,9 +100,9 @@ def test_each_machine_answers_its_part_and_the_total_adds_them(bench, cache, nam
     np.testing.assert_allclose(total[-1].position, parts[0][-1].position, rtol=1e-12)
 
 
-def test_one_message_tells_the_speeds_of_a_plant_by_its_joints(bench):
-    bench.active('hall', hall__case='fan_house', hall__fan_2__rotor_joint='right',
-                 hall__fan_2__speed__unit='rpm')
+def test_one_message_tells_the_speeds_of_a_plant_by_its_joints(bench, cache, tmp_path):
+    node = bench.active('hall', hall__case='fan_house', hall__fan_2__rotor_joint='right',
+                        hall__fan_2__speed__unit='rpm', log__directory=str(tmp_path))
     parts = [bench.answers(f'hall/{name}')[0] for name in ('fan_1', 'fan_2')]
     total = bench.hear('/rotorsoil/hall/total')
     speak = bench.speaker('/hall/joint_states', listeners=())
@@ -107,6 +111,18 @@ def test_one_message_tells_the_speeds_of_a_plant_by_its_joints(bench):
     assert stamp_ns(total[-1]) == STAMP
     speeds = [np.nanmedian(np.divide(part[0].velocity, part[0].position)) for part in parts]
     np.testing.assert_allclose(speeds, [150.0, 1400.0 * np.pi / 30.0], rtol=1e-9)
+    node.release()
+    # The log is that of machines whose speeds were told one by one, and is answered the same.
+    log, again = tmp_path / 'run', tmp_path / 'again.mcap'
+    assert {'/rotorsoil/hall/total', '/rotorsoil/hall/beats',
+            '/rotorsoil/hall/fan_2/share'} <= {*topics_of(log)}
+    for name in ('fan_1', 'fan_2'):
+        fan = Machine.load(Path(f'{HOUSE}#{name}'), cache_directory=cache)
+        assert predict(fan, log, again).machine == f'hall/{name}'
+        told = [[payload for source, _, payload in bag_reader.messages(
+            path, lambda topic, kind, name=name: topic == f'/rotorsoil/hall/{name}/amplitude')]
+            for path in (log, again)]
+        assert told[0] == told[1] != []
 
 
 def test_machine_without_an_answer_is_named_and_adds_nothing(bench):

@@ -252,7 +252,8 @@ def _add_compare(verbs: Verbs) -> None:
     add('--set', metavar='KEY.PATH=VALUE', dest='overrides', action='append', default=[],
         help='override the case file; may be repeated')
     add('--cache', metavar='DIR', type=Path, help='directory of computed tables')
-    add('--machine', metavar='NAME', help='which machine, if the log tells of several')
+    add('--machine', metavar='NAME',
+        help='which machine, if the log tells of several; of a plant MACHINE or PLANT/MACHINE')
     add_speed(compare)
     add('--tolerance-s', metavar='S', type=SIZE, default=0.05,
         help='largest distance of stamps that belong together [s] (default: %(default)s)')
