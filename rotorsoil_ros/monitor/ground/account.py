@@ -1,7 +1,7 @@
 """What part of measured vibration comes from the ground, and what is left without it."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -102,10 +102,10 @@ class GroundAccount:
                 speed, *vectors = (np.array(part) for part in zip(*rows, strict=True))
                 yield GroundShare.of(channel, speed, *vectors)
 
-    def values(self) -> dict[str, float | str]:
-        """Return the same by keys that say their unit, and zones without the ground."""
+    def values(self, shares: Iterable[GroundShare]) -> dict[str, float | str]:
+        """Return shares by keys that say their unit, and zones without the ground."""
         found: dict[str, float | str] = {}
-        for share in self.shares():
+        for share in shares:
             name, unit = share.channel, f'u{share.channel.unit}'
             found |= {f'{name}_ground_{MILLI_UNITS[share.channel.unit]}': MILLI * share.part,
                       f'{name}_ground_share': share.share,

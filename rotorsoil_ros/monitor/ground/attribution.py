@@ -66,7 +66,7 @@ class Attribution:
         self._waiting: dict[int, list[float]] = {}
         self._weighed: deque[Weighed] = deque()
         self._known: dict[int, ComplexArray | None] = {}
-        self._is_led, self._second = False, -1
+        self._led_ns, self._second = -1, -1
         self._sensors = judging.sensors
         self.spectra = Spectra(moving, tuple(self.sensors), history)
         self.account = GroundAccount(judging.rules, moving.table.channels, zones)
@@ -102,7 +102,7 @@ class Attribution:
     def see(self, event: Event) -> None:
         """Note which vectors of the machine there are, and what becomes of them."""
         if isinstance(event, Compared):
-            self._is_led = True
+            self._led_ns = int(event.stamp_ns[-1])
             for stamp, speed in zip(event.stamp_ns.tolist(), event.speed.tolist(), strict=True):
                 self._want(stamp, speed)
         elif isinstance(event, Weighed):
@@ -117,8 +117,7 @@ class Attribution:
     ) -> Iterator[Event]:
         """Tell how the ground moved, as far as it has been heard, and what that did."""
         self._take_told()
-        if not self._is_led:
-            self._want_full_second()
+        self._want_full_second()
         for stamp, speed in self._ready(is_last=is_last):
             yield from self._told(stamp, speed, predictor)
         while self._weighed and (is_last or not any(
@@ -146,7 +145,7 @@ class Attribution:
             self._halves.pop(next(iter(self._halves)))
 
     def _want_full_second(self) -> None:
-        """Look at the latest full second about which everything is known."""
+        """Look at the latest full second about which all is known and nothing was measured."""
         speed = self._history.last_speed
         heard = [one for one in self.sensors.values() if one.is_raw]
         if not heard or not speed > 0.0:
@@ -156,6 +155,7 @@ class Attribution:
         second = (last_ns - reach) // NANOSECONDS
         begin_ns = max(one.first_ns for one in heard) + reach
         # Another one, not a later one: stamps may go back.
+        begin_ns = max(begin_ns, self._led_ns + 2 * reach)
         if second != self._second and second * NANOSECONDS >= begin_ns:
             self._second, stamp = second, second * NANOSECONDS
             self._want(stamp, self._history.speed_near(stamp, tolerance_ns=NANOSECONDS))
@@ -263,12 +263,13 @@ class Attribution:
         silent = [f'{name}: silent' for name, sensor in self.sensors.items()
                   if 0 <= sensor.last_ns < now_ns - stale_after_s * NANOSECONDS]
         doubts = [*silent, *self.doubts()]
-        shares = [one for one in self.account.shares() if one.channel.is_housing]
-        most = max(shares, key=lambda one: one.part, default=None)
+        every = list(self.account.shares())
+        most = max((one for one in every if one.channel.is_housing),
+                   key=lambda one: one.part, default=None)
         said = '' if most is None else (
             f'{MILLI * most.part:.2f} mm/s rms of {most.channel} from the ground, '
             f'{most.share:.0%} of what is measured')
-        values: dict[str, float | str] = self.account.values()
+        values = self.account.values(every)
         for name, sensor in self.sensors.items():
             values |= {f'{name}_{key}': value for key, value in sensor.refusals.values().items()}
         values |= {f'{name}_own_share': share for name, share in self.own_share.items()}

@@ -143,6 +143,31 @@ def test_nothing_heard_is_told(fan, busy):
     assert part.summary.startswith('yard: nothing heard')
 
 
+def test_sensor_that_falls_silent_is_told(fan, busy):
+    monitor = watched(fan, replace(busy, time=busy.time[:1000]), turns=25.0)
+    last_ns = monitor.ground.sensors['yard'].last_ns
+    for since_s, level in ((2, Level.OK), (5, Level.WARN)):
+        [said] = [event for event in monitor.ground.tick(
+            last_ns + since_s * 10**9, monitor._predictor, stale_after_s=3.0)
+            if isinstance(event, Diagnostics)]
+        assert said.level >= level
+        assert said.summary.startswith('yard: silent') is (since_s > 3)
+
+
+def test_full_seconds_stand_in_where_housings_fall_silent(fan, busy):
+    """And give way again: a part of the ground is told all the time, once for each stretch."""
+    events, half = [], 10.0
+    gone = {channel: np.where(busy.time < half, values, np.nan)
+            for channel, values in busy.housings.items()}
+    watched(fan, replace(busy, time=busy.time[:5000], housings=gone), turns=25.0, events=events)
+    stamps = np.concatenate([event.stamp_ns for event in events if isinstance(event, Grounded)])
+    since = (stamps - START) / 1e9
+    assert len(since[since < half - 2.0]) > 5
+    late = since[since > half + 1.0]
+    assert len(late) > 5
+    np.testing.assert_allclose(late, np.round(late), atol=1e-9)
+
+
 def test_without_a_phase_reference_nothing_is_subtracted(fan, busy):
     monitor = watched(fan, replace(busy, time=busy.time[:5000]), angle=False)
     assert not shares(monitor)
