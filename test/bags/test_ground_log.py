@@ -1,5 +1,6 @@
 """A log with sensors on the ground is compared as it was watched, and that is reported."""
 
+import csv
 import json
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.bags.feed import feed, Inputs
+from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.figures.comparison import document, HEADER, rows
@@ -94,6 +96,23 @@ def test_report_numbers_and_picture_tell_it(found):
     text = page(found, [], source='road.mcap')
     assert 'Ground that moves by itself' in text
     assert 'zone without the ground' in text
+
+
+def test_answers_to_a_log_tell_the_part_of_the_ground_and_tables_have_it(
+        log, fan, found, tmp_path):
+    predict(fan, log, tmp_path / 'log.mcap')
+    assert rs.export_log(tmp_path / 'log.mcap', tmp_path / 'log.csv')
+    with (tmp_path / 'log.csv').open() as stream:
+        told = {int(row['stamp_ns']): row for row in csv.DictReader(stream)
+                if row['channel'] == HOUSING and row['ground_m']}
+    [points] = [points for points in found.points if points.channel == HOUSING]
+    part = dict(zip(points.stamp_ns.tolist(), found.ground.parts[points.channel], strict=True))
+    known = [stamp for stamp, value in part.items() if np.isfinite(value) and stamp in told]
+    assert len(known) > 40
+    for quantity, values in (('m', np.abs), ('phase_rad', np.angle)):
+        np.testing.assert_allclose(
+            [float(told[stamp][f'ground_{quantity}']) for stamp in known],
+            [values(part[stamp]) for stamp in known], rtol=1e-9)
 
 
 def heard(log, machine):

@@ -27,11 +27,14 @@ from rotorsoil_ros.wire.speeds import SpeedReader, USUAL
 Progress = Callable[[int, int], None]
 
 # Columns of amplitudes: those of a displacement in m, those of a rotation in rad.
-SIZED = ('predicted', 'predicted_low', 'predicted_high', 'steady', 'measured', 'residual')
+SIZED = ('predicted', 'predicted_low', 'predicted_high', 'steady', 'measured', 'residual',
+         'ground')
+# Phases beside them.
+TURNED = ('predicted_phase', 'steady_phase', 'measured_phase', 'ground_phase')
 COLUMNS: dict[str, type] = {
     'machine': str, 'stamp_ns': int, 'channel': str, 'speed_rad_s': float,
     **{f'{name}_{unit}': float for unit in ('m', 'rad') for name in SIZED},
-    'predicted_phase_rad': float, 'steady_phase_rad': float, 'measured_phase_rad': float,
+    **{f'{name}_rad': float for name in TURNED},
     'predicted_velocity_m_s_rms': float, 'measured_velocity_m_s_rms': float,
     'predicted_zone': str, 'measured_zone': str, 'not_predicted': str}
 UNSTABLE, UNSTABLE_RANGES = 'unstable', 'unstable_rad_s'  # why nothing is predicted
@@ -40,7 +43,8 @@ TOLD_BY = {'amplitude': 'predicted', 'phase': 'predicted_phase', 'amplitude_low'
         'amplitude_high': 'predicted_high', 'residual': 'residual',
         'steady/amplitude': 'steady', 'steady/phase': 'steady_phase',
         'demodulated/amplitude': 'measured', 'demodulated/phase': 'measured_phase',
-        'measured/amplitude': 'measured', 'measured/phase': 'measured_phase'}
+        'measured/amplitude': 'measured', 'measured/phase': 'measured_phase',
+        'ground/amplitude': 'ground', 'ground/phase': 'ground_phase'}
 SETTLED_NS = 5 * NANOSECONDS  # after which nothing of a stamp comes any more
 MESSAGES_AT_ONCE = 512
 ROWS_AT_ONCE = 50_000
@@ -183,7 +187,7 @@ class _Machine:
                 if quantity in ('predicted', 'measured') and not channel.is_rotation:
                     rms = (rate if math.isfinite(rate) else speed * at) / math.sqrt(2.0)
                     row[f'{quantity}_velocity_m_s_rms'] = rms
-            for quantity in ('predicted_phase', 'steady_phase', 'measured_phase'):
+            for quantity in TURNED:
                 at, rate = _said(told, quantity, name)
                 ahead = math.remainder(rate - 0.5 * math.pi, 2.0 * math.pi)
                 row[f'{quantity}_rad'] = at if math.isfinite(at) else ahead
