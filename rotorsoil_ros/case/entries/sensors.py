@@ -6,6 +6,7 @@ import difflib
 import math
 
 from rotorsoil_ros.case.case_errors import Faults
+from rotorsoil_ros.case.entries.support_file import RECEPTANCE
 from rotorsoil_ros.case.schema import GroundSensorEntry, PickupEntry
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import require, RotorSoilError
@@ -147,6 +148,10 @@ def _on_ground(
     blocks = {block.name: block for block in foundations}
 
     def of() -> str:
+        if entries.sensors and faults.entries.support.model == RECEPTANCE:
+            raise faults.error('ground', 'sensors', problem=(
+                'need a support model that tells how the machine follows the ground, got '
+                f'{RECEPTANCE}'))
         if entries.of is not None and entries.of not in blocks:
             raise faults.error('ground', 'of', problem=(
                 f'must be one of the foundations, {", ".join(blocks) or "none"}, got '

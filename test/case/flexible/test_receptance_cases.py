@@ -146,6 +146,9 @@ def test_a_log_carries_the_table(tables, tmp_path):
     (['support.file=no_own.csv'],
      'no_own.csv: fan_1_b2_z__fan_1_b2_z must be given, as zeros where a seat does not move'),
     (['support.file=turned.csv'], 'turned.csv: the foundation must not give energy'),
+    (['ground.sensors=[{name: yard, place: {x: 9.0, y: 0.0}}]'],
+     'ground.sensors: need a support model that tells how the machine follows the ground, got '
+     'receptance'),
 ])
 def test_bad_input_is_one_line(tables, settings, said):
     text = (tables / 'block_seats.csv').read_text()
