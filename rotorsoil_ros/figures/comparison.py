@@ -12,7 +12,7 @@ import numpy as np
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.figures.ground import ground_document, ground_figure
-from rotorsoil_ros.figures.response import COLOURS, legend_below
+from rotorsoil_ros.figures.response import bode_axes, COLOURS, legend_below, tidy, without_jumps
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.criteria import answer, Expectation
@@ -64,8 +64,7 @@ def _unit(channel: Channel) -> str:
 
 def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
     """Draw amplitude and phase of a channel over speed: line, band, points used and left out."""
-    figure = Figure(figsize=(7.5, 5.4), layout='constrained')
-    amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    figure, amplitude, phase = bode_axes()
     _draw_prediction(amplitude, phase, comparison, points)
     _draw_band(amplitude, phase, points)
     measured = _MICRO * points.amplitude
@@ -83,14 +82,9 @@ def bode(comparison: Comparison, points: ChannelPoints) -> Figure:
         amplitude.set_ylim(bottom=0.3 * float(np.percentile(positive, 1.0)))
     amplitude.set_yscale('log')
     amplitude.set_ylabel(f'amplitude, peak-to-peak [{_unit(points.channel)}]')
-    phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
-              yticks=range(-180, 181, 90))
     if len(speed) and np.isfinite(speed).any():
         phase.set_xlim(float(np.nanmin(speed)), float(np.nanmax(speed)) + 1e-6)
     legend_below(figure, amplitude, columns=3)
-    for axes in (amplitude, phase):
-        axes.grid(alpha=0.3)
-        axes.tick_params(labelsize=8)
     figure.suptitle(f'{comparison.run.title}: {_label(points)}, 1X', fontsize=10)
     return figure
 
@@ -129,9 +123,7 @@ def _draw_vectors(
 ) -> None:
     """Draw vectors over speed [rad/s]: the phase is not drawn across a whole turn."""
     amplitude.plot(rad_s_to_rpm(speed), _MICRO * np.abs(vector), label=label, **style)
-    degrees = np.rad2deg(np.angle(vector))
-    jump = np.abs(np.diff(degrees, prepend=degrees[:1])) > 300.0
-    phase.plot(rad_s_to_rpm(speed), np.where(jump, np.nan, degrees), **style)
+    phase.plot(rad_s_to_rpm(speed), without_jumps(np.rad2deg(np.angle(vector))), **style)
 
 
 def _draw_band(amplitude: Axes, phase: Axes, points: ChannelPoints) -> None:
@@ -240,9 +232,7 @@ def trend(comparison: Comparison) -> Figure:
                else f'amplitude, peak-to-peak [{_unit(shown[0].channel)}]')
     bottom.legend(fontsize=7, ncols=3, loc='upper center', bbox_to_anchor=(0.5, -0.14))
     for axes in (top, bottom):
-        axes.grid(alpha=0.3)
-        axes.tick_params(labelsize=8)
-        axes.margins(x=0.01)
+        tidy(axes)
     figure.suptitle(f'{comparison.run.title}: trend', fontsize=10)
     return figure
 
@@ -291,8 +281,7 @@ def residuals(comparison: Comparison) -> Figure:
     plane.set_title('vectors that are used', fontsize=8)
     figure.suptitle(f'{comparison.run.title}: residuals', fontsize=10)
     for axes in (size, plane):
-        axes.grid(alpha=0.3)
-        axes.tick_params(labelsize=8)
+        tidy(axes)
     return figure
 
 

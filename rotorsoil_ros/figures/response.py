@@ -21,7 +21,7 @@ from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.critical import critical_speeds, CriticalSpeed
 from rotorsoil_ros.machine.peaks import Peak, resolved_speeds, resonances
 from rotorsoil_ros.machine.response import Predictor, ResponseTable
-from rotorsoil_ros.rotor.shaft import crossed, Probe
+from rotorsoil_ros.rotor.shaft import Probe
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm
 
 # Okabe and Ito: told apart by every eye, and in grey.
@@ -145,31 +145,38 @@ def bode(predictor: Predictor, channels: Sequence[Channel], title: str) -> Figur
     """Draw amplitude, zero-to-peak, and phase of channels of one unit over the speed."""
     speed = resolved_speeds(predictor)
     response = predictor.predict(speed).displacement
-    figure = Figure(figsize=(7.5, 5.2), layout='constrained')
-    amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    figure, amplitude, phase = bode_axes()
     for number, channel in enumerate(channels):
         values = response[:, predictor.channels.index(channel)]
         moving = np.abs(values) > _SMALLEST_DRAWN
         if not np.any(moving):
             continue
-        style = {'color': COLOURS[number // 2 % len(COLOURS)], 'linewidth': 1.2,
-                 'linestyle': ('-', '--')[number % 2], 'label': channel}
+        style: dict[str, Any] = {
+            'color': COLOURS[number // 2 % len(COLOURS)], 'linewidth': 1.2,
+            'linestyle': ('-', '--')[number % 2], 'label': channel}
         x = rad_s_to_rpm(speed[moving])
         amplitude.semilogy(x, _MICRO * np.abs(values[moving]), **style)
-        phase.plot(x, _without_jumps(np.rad2deg(np.angle(values[moving]))), **style)
+        phase.plot(x, without_jumps(np.rad2deg(np.angle(values[moving]))), **style)
     amplitude.set_ylabel(f'amplitude, zero-to-peak [u{channels[0].unit}]')
-    phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
-              yticks=range(-180, 181, 90))
     legend_below(figure, amplitude)
-    tidy(amplitude)
-    tidy(phase)
     figure.suptitle(title, fontsize=10)
     return figure
 
 
-def _without_jumps(degrees: FloatArray) -> FloatArray:
+def bode_axes() -> tuple[Figure, Axes, Axes]:
+    """Return a figure with axes for amplitudes, and below for phases, over the speed."""
+    figure = Figure(figsize=(7.5, 5.3), layout='constrained')
+    amplitude, phase = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    phase.set(ylabel='phase [deg]', xlabel='speed [rpm]', ylim=(-190, 190),
+              yticks=range(-180, 181, 90))
+    tidy(amplitude)
+    tidy(phase)
+    return figure, amplitude, phase
+
+
+def without_jumps(degrees: FloatArray) -> FloatArray:
     """Break a line where its phase passes from one end of the scale to the other."""
-    jump = np.abs(np.diff(degrees, prepend=degrees[0])) > 300.0
+    jump = np.abs(np.diff(degrees, prepend=degrees[:1])) > 300.0
     return np.where(jump, np.nan, degrees)
 
 
@@ -193,29 +200,23 @@ def drawn_criticals(
 
 def orbits(case: Case, predictor: Predictor, criticals: Sequence[CriticalSpeed]) -> Figure:
     """Draw the orbit of every station at critical speeds, a row for each."""
-    rotor = case.rotor
-    here = np.eye(2)
-    stations = [(channels[0].place, channels, here) for channels in (
-        *(across(bearing.name, JOURNAL) for bearing in rotor.bearings),
-        *(across(disc.name) for disc in rotor.discs),
-        *(across(probe.name) for probe in rotor.probes if probe.angle is None))]
-    stations += [(pair.name, pair.channels, pair.turn) for pair in crossed(rotor.probes)]
+    stations = case.rotor.orbits
     figure = Figure(figsize=(max(1.9 * len(stations) + 0.6, 6.5), 2.4 * len(criticals) + 0.6),
                     layout='constrained')
     rows = figure.subfigures(len(criticals), 1, squeeze=False)[:, 0]
     for critical, row in zip(criticals, rows, strict=True):
         motion = predictor.predict(np.array([critical.speed])).displacement[0]
         every = row.subplots(1, len(stations), squeeze=False)[0]
-        for (place, channels, turn), axes in zip(stations, every, strict=True):
-            seen = motion[[predictor.channels.index(channel) for channel in channels]]
-            x, z = (_over_a_turn(complex(amplitude)) for amplitude in turn @ seen)
+        for station, axes in zip(stations, every, strict=True):
+            seen = motion[[predictor.channels.index(channel) for channel in station.channels]]
+            x, z = (_over_a_turn(complex(amplitude)) for amplitude in station.turn @ seen)
             axes.plot(x, z, color=COLOURS[0])
             axes.plot(x[0], z[0], 'o', color=COLOURS[1], markersize=4)
             axes.set_aspect('equal', adjustable='datalim')
             axes.tick_params(labelsize=6)
             axes.locator_params(nbins=4)
             axes.grid(alpha=0.3)
-            axes.set_title(place, fontsize=7)
+            axes.set_title(station.name, fontsize=7)
             axes.set_xlabel('x [um]', fontsize=7)
         every[0].set_ylabel('z [um]', fontsize=7)
         row.suptitle(title_of(critical), fontsize=8)

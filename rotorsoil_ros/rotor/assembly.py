@@ -14,7 +14,7 @@ from rotorsoil_ros.rotor.beam import BeamElements, element_matrices, ElementMatr
 from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.rotor.disc import Disc
 from rotorsoil_ros.rotor.losses import Losses
-from rotorsoil_ros.rotor.shaft import Probe, ShaftSection
+from rotorsoil_ros.rotor.shaft import crossed, Orbit, Probe, ShaftSection
 
 # Stations closer than this share of the shaft length to a node are that node.
 _SAME_NODE = 1e-9
@@ -96,6 +96,14 @@ class Rotor:
                   for channel in across(bearing.name, part)),
                 *(channel for disc in self.discs for channel in across(disc.name)),
                 *(channel for probe in self.probes for channel in probe.channels))
+
+    @property
+    def orbits(self) -> tuple[Orbit, ...]:
+        """Places of the shaft of which both directions are known."""
+        return (*(Orbit.of(bearing.name, bearing.position, JOURNAL) for bearing in self.bearings),
+                *(Orbit.of(disc.name, disc.position) for disc in self.discs),
+                *(Orbit.of(probe.name, probe.position) for probe in self.probes
+                  if probe.angle is None), *crossed(self.probes))
 
     @cached_property
     def view(self) -> FloatArray | None:

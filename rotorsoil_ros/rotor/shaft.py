@@ -149,18 +149,18 @@ class Probe:
 
 
 @dataclass(frozen=True, slots=True)
-class CrossedProbes:
+class Orbit:
     """
-    Two probes that look at one place from two sides: together they see its orbit.
+    A place whose motion two channels tell: along x and z, or from two sides.
 
     Attributes
     ----------
     name : str
-        Of both.
+        Of the place, or of both probes.
     position : float
         Along the shaft [m].
     channels : tuple of two Channels
-        What they tell.
+        Which.
     turn : (2, 2) float array
         Motion over (x, z) per what they tell.
 
@@ -171,8 +171,14 @@ class CrossedProbes:
     channels: tuple[Channel, Channel]
     turn: FloatArray
 
+    @classmethod
+    def of(cls, station: str, position: float, part: str = '') -> 'Orbit':
+        """Return that of a place that is told along x and z."""
+        channels = across(station, part)
+        return cls(channels[0].place, position, channels, np.eye(2))
 
-def crossed(probes: Sequence[Probe]) -> Iterator[CrossedProbes]:
+
+def crossed(probes: Sequence[Probe]) -> Iterator[Orbit]:
     """Yield the pairs of probes at one place that do not look the same way."""
     left = [probe for probe in probes if probe.angle is not None]
     while left:
@@ -182,6 +188,6 @@ def crossed(probes: Sequence[Probe]) -> Iterator[CrossedProbes]:
             if ((other.position, other.relative_to) == (one.position, one.relative_to)
                     and abs(np.linalg.det(seen)) > _PARALLEL):
                 left.remove(other)
-                yield CrossedProbes(f'{one.name}_{other.name}', one.position,
-                                    (one.channels[0], other.channels[0]), np.linalg.inv(seen))
+                yield Orbit(f'{one.name}_{other.name}', one.position,
+                            (one.channels[0], other.channels[0]), np.linalg.inv(seen))
                 break

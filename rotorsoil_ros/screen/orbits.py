@@ -11,10 +11,10 @@ import rerun.blueprint as rrb
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.channel import across, HOUSING, JOURNAL
+from rotorsoil_ros.channel import HOUSING
 from rotorsoil_ros.events import Compared, NANOSECONDS
 from rotorsoil_ros.monitor.vectors.history import nearest
-from rotorsoil_ros.rotor.shaft import crossed
+from rotorsoil_ros.rotor.shaft import Orbit
 from rotorsoil_ros.screen.bode import MEASURED, PREDICTED
 from rotorsoil_ros.screen.channels import MICRO, moving_housings
 from rotorsoil_ros.screen.chart import drawn_grid, Label, round_up, TEXT, written
@@ -229,26 +229,18 @@ class Track:
 
 def cells(case: Case, channels: Sequence[str]) -> list[Cell]:
     """Return the circles of a machine, along its shaft; housings that stand on soil below."""
-    rotor = case.rotor
-    here = np.eye(2)
-    on_shaft = [(bearing.position, bearing.name, across(bearing.name, JOURNAL), here)
-                for bearing in rotor.bearings]
-    on_shaft += [(disc.position, disc.name, across(disc.name), here) for disc in rotor.discs]
-    on_shaft += [(probe.position, probe.name, across(probe.name), here)
-                 for probe in rotor.probes if probe.angle is None]
-    on_shaft += [(pair.position, pair.name, pair.channels, pair.turn)
-                 for pair in crossed(rotor.probes)]
     moving = moving_housings(case)
-    housings = [(bearing.position, bearing.name, across(bearing.name, HOUSING), here)
-                for bearing in rotor.bearings if bearing.name in moving]
+    housings = [Orbit.of(bearing.name, bearing.position, HOUSING)
+                for bearing in case.rotor.bearings if bearing.name in moving]
     found = []
-    for row, stations in enumerate((on_shaft, housings)):
-        along = sorted(stations, key=lambda station: station[:3])
-        for column, (_, name, (first, second), turn) in enumerate(along):
+    for row, stations in enumerate((case.rotor.orbits, housings)):
+        along = sorted(stations, key=lambda station: (station.position, station.name))
+        for column, station in enumerate(along):
+            first, second = station.channels
             if first in channels and second in channels:
-                place = first.place if first.axis else name
-                found.append(Cell(place, (channels.index(first), channels.index(second)), turn,
-                                  np.array([column * PITCH, row * ROW])))
+                found.append(Cell(
+                    station.name, (channels.index(first), channels.index(second)), station.turn,
+                    np.array([column * PITCH, row * ROW])))
     return found
 
 

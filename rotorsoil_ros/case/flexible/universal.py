@@ -9,8 +9,6 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
 
-# Modal mass of a shape may be off from one by so much: six digits.
-_UNIT_MASS = 1e-3
 # Share of a shape that may be out of phase.
 _REAL = 0.05
 _MODES = 55
