@@ -7,13 +7,16 @@ import shlex
 import shutil
 
 import build
+from matplotlib.patches import Rectangle as Box
 import numpy as np
 import pytest
 import scipy.io
 
+from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.figures.bending import bending_figure
+from rotorsoil_ros.figures.drawing import machine_drawing
 
 HERE = Path(__file__).parent
 
@@ -52,6 +55,18 @@ def test_example_bends_where_a_rigid_body_would_not(file, settings, tmp_path):
     seats = [one.standing(speed).receptance[0] for one in (support, stiff)]
     assert np.abs(seats[0] - seats[1]).max() > 0.05 * np.abs(seats[0]).max()
     assert len(bending_figure(machine.case, machine.model).axes) >= 1
+
+
+def test_a_frame_is_drawn_on_its_legs_and_a_raft_as_a_slab():
+    for file, source, slab in (('turbine_deck.yaml', [], None), (
+            'raft_house.yaml', ['source=fan_1'], 1.0)):
+        side = machine_drawing(load(HERE / file, source)).axes[0]
+        boxes = [patch.get_height() for patch in side.patches
+                 if isinstance(patch, Box) and patch.get_y() == 0.0]
+        assert boxes == [slab] * (slab is not None)
+        legs = [line for line in side.get_lines() if line.get_xydata()[:, 1].tolist() == [4.0, 0.0]
+                or line.get_xydata()[:, 1].tolist() == [0.0, 4.0]]
+        assert len(legs) == (0 if slab else 4)
 
 
 def test_commands_of_the_readme_run_and_print_what_is_shown(tmp_path, monkeypatch, capsys):
