@@ -18,6 +18,9 @@ LATEST_VECTORS = 128
 
 MICRO, MILLI = 1e6, 1e3
 
+# A part above this share of what is measured should leave less than this of the residual.
+_WORTH, _LEFT = 0.1, 0.7
+
 
 @dataclass(frozen=True, slots=True)
 class GroundShare:
@@ -66,6 +69,17 @@ class GroundShare:
         return cls(channel, len(left), by_ground / math.sqrt(2.0),
                    by_ground / moved if moved else math.nan, _rms(left), _rms(left - part),
                    float(np.std(left)), float(np.std(left - part)))
+
+
+    @property
+    def doubt(self) -> str:
+        """Why a part that is worth telling is hardly the ground's; empty where it may be."""
+        if not (self.share > _WORTH and self.residual_less > _LEFT * self.residual):
+            return ''
+        left = self.residual_less / self.residual
+        return (f'{self.channel}: without the part of the ground {left:.0%} of the residual are '
+                'left: once per turn it is hardly the ground, or the machine is not as unbalanced '
+                'as its case says, and does more to the sensors than was taken off')
 
 
 def _rms(values: ComplexArray) -> float:

@@ -262,8 +262,8 @@ class Attribution:
     def _diagnostics(self, now_ns: int, stale_after_s: float) -> Diagnostics:
         silent = [f'{name}: silent' for name, sensor in self.sensors.items()
                   if 0 <= sensor.last_ns < now_ns - stale_after_s * NANOSECONDS]
-        doubts = [*silent, *self.doubts()]
         every = list(self.account.shares())
+        doubts = [*silent, *self.doubts(), *(one.doubt for one in every if one.doubt)]
         most = max((one for one in every if one.channel.is_housing),
                    key=lambda one: one.part, default=None)
         said = '' if most is None else (

@@ -82,4 +82,5 @@ class GroundCollector:
             f'no {STRETCH_S} s in which ground and housings were sampled together without a hole: '
             'of other frequencies than the speed nothing is told of the ground']
         return GroundFindings(parts, shares, zones, broadband,
-                              [*attribution.doubts(), *sensors, *short])
+                              [*attribution.doubts(), *(one.doubt for one in shares if one.doubt),
+                               *sensors, *short])

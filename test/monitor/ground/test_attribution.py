@@ -61,6 +61,7 @@ def test_ground_that_moves_once_per_turn_is_found_to_the_last_digit(fan):
     assert found.part == pytest.approx(RUNNING * abs(ratio * size) / np.sqrt(2.0), rel=1e-3)
     assert found.residual == pytest.approx(abs(ratio * size), rel=1e-3)
     assert found.residual_less < 2e-3 * found.residual
+    assert not found.doubt
 
 
 def test_sensor_that_feels_only_the_machine_tells_of_no_ground(fan):
@@ -70,6 +71,15 @@ def test_sensor_that_feels_only_the_machine_tells_of_no_ground(fan):
     assert monitor.ground.own_share['yard'] == pytest.approx(1.0, abs=1e-3)
     [doubt] = monitor.ground.doubts()
     assert 'is the machine itself' in doubt
+
+
+def test_unbalance_that_is_not_that_of_the_case_is_not_told_as_ground(fan):
+    """It does more to the sensor than is taken off, but that is not what the housings show."""
+    monitor = watched(fan, felt(fan, np.zeros(30 * 250), noise=1e-6, own=2.0), turns=25.0)
+    found = shares(monitor)['fan_end_housing_z']
+    assert found.share > 0.1
+    assert found.residual_less > 0.7 * found.residual
+    assert 'the machine is not as unbalanced as its case says' in found.doubt
 
 
 def test_zone_without_the_ground_is_that_of_the_machine(fan):
