@@ -37,7 +37,7 @@ def bending_told(
 ) -> Iterator[tuple[str, str]]:
     """Yield the first bending of each block beside what it has to be above."""
     for _, block, found in rigidities(case, soil_models):
-        yield f'{block.name}: first bending, if it were free', (
+        yield f'{block.name}: first {_moves(found)[:-1]}ing, if it were free', (
             f'{_numbers(block, found)}: {found.over_excitation:.3g} times the highest 1X'
             + (f', {found.over_heave:.3g} times its heave' if found.heave > 0.0 else ''))
 
@@ -51,7 +51,7 @@ def of_rigidity(case: Case, soil_models: Sequence[SoilModel]) -> Iterator[str]:
         reasons = []
         if found.over_excitation < ABOVE_EXCITATION:
             most = next(error for share, error in _DYNAMIC
-                        if found.excitation <= share * found.bending)
+                        if found.excitation <= share * found.lowest)
             reasons.append(
                 f'{ABOVE_EXCITATION:g} times the highest 1X frequency of {top:.3g} Hz are '
                 f'{ABOVE_EXCITATION * top:.3g} Hz (a raft so near was off by {most})')
@@ -60,12 +60,18 @@ def of_rigidity(case: Case, soil_models: Sequence[SoilModel]) -> Iterator[str]:
             reasons.append(
                 f'{ABOVE_HEAVE:g} times its heave of {heave:.3g} Hz are '
                 f'{ABOVE_HEAVE * heave:.3g} Hz (off by {found.static_error:.0%} at rest)')
-        yield (f'foundations.{index}: {block.name} is not rigid: free, it bends at '
+        yield (f'foundations.{index}: {block.name} is not rigid: free, it {_moves(found)} at '
                f'{_numbers(block, found)}; {"; ".join(reasons)}; '
                'say flexible instead, with its stiffness and mass')
 
 
+def _moves(found: Rigidity) -> str:
+    return 'twists' if found.twist < found.bending else 'bends'
+
+
 def _numbers(block: Foundation, found: Rigidity) -> str:
     shape = '' if found.is_slab else ' long at most, a plan that bends lower than such a slab'
-    return (f'{rad_s_to_hz(found.bending):.3g} Hz (slab {found.length:.3g} m'
+    if found.twist < found.bending:
+        shape = f' by {found.width:.3g} m'
+    return (f'{rad_s_to_hz(found.lowest):.3g} Hz (slab {found.length:.3g} m'
             f'{shape}, {found.thickness:.3g} m thick, E {1e-9 * block.young_modulus:.3g} GPa)')

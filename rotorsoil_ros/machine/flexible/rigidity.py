@@ -7,7 +7,7 @@ import numpy as np
 
 from rotorsoil_ros.errors import OutOfTableError
 from rotorsoil_ros.ground.plan import Plan
-from rotorsoil_ros.ground.soil import extents, SoilModel
+from rotorsoil_ros.ground.soil import Circle, extents, SoilModel
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
@@ -33,14 +33,14 @@ class Rigidity:
 
     Attributes
     ----------
-    bending : float
-        First frequency of the free block [rad/s].
+    bending, twist : float
+        First frequencies of the free block [rad/s]; infinite twist where its plan is no rectangle.
     heave : float
         Of the rigid block on the static stiffness of its ground [rad/s]; 0 where none is known.
     excitation : float
         Highest frequency of once per turn [rad/s].
-    length, thickness : float
-        Of the slab that stands for it [m].
+    length, width, thickness : float
+        Of the slab that stands for it, the longest first [m].
     is_slab : bool
         Whether it is one, or a disc; of an L or a T the length is the longest extent.
 
@@ -51,16 +51,23 @@ class Rigidity:
     """
 
     bending: float
+    twist: float
     heave: float
     excitation: float
     length: float
+    width: float
     thickness: float
     is_slab: bool
 
     @property
+    def lowest(self) -> float:
+        """The lower of both [rad/s]."""
+        return min(self.bending, self.twist)
+
+    @property
     def over_excitation(self) -> float:
-        """Bending over excitation [-]."""
-        return self.bending / self.excitation
+        """The lower of both over excitation [-]."""
+        return self.lowest / self.excitation
 
     @property
     def over_heave(self) -> float:
@@ -101,6 +108,33 @@ def free_bending(*, length: float, thickness: float, modulus: float, density: fl
     return RADIANS_PER_TURN * thin / math.sqrt(1.0 + slender * (_ROTARY + _SHEAR * shear))
 
 
+def free_twist(
+    *, length: float, width: float, thickness: float, modulus: float, density: float,
+) -> float:
+    """
+    Return the first frequency at which a free slab twists about its length [rad/s].
+
+    Parameters
+    ----------
+    length, width, thickness : float
+        [m].
+    modulus, density : float
+        As `free_bending`.
+
+    References
+    ----------
+    Torsion constant of a rectangle: Young & Budynas, Roark's Formulas for Stress and Strain
+    (2002), table 10.1.
+
+    """
+    wide, thin = max(width, thickness), min(width, thickness)
+    slender = thin / wide
+    constant = wide * thin**3 * (1.0 / 3.0 - 0.21 * slender * (1.0 - slender**4 / 12.0))
+    polar = wide * thin * (wide**2 + thin**2) / 12.0
+    shear = modulus / (2.0 * (1.0 + _POISSON_RATIO))
+    return math.pi / length * math.sqrt(shear * constant / (density * polar))
+
+
 def rigidity(block: Foundation, ground: SoilModel, speed: tuple[float, float]) -> Rigidity | None:
     """
     Return how rigid a block is.
@@ -125,12 +159,18 @@ def rigidity(block: Foundation, ground: SoilModel, speed: tuple[float, float]) -
     thickness = block.height or 2.0 * block.centre_of_gravity_height
     if not (block.mass > 0.0 and thickness > 0.0) or heave == math.inf:
         return None
-    sides = [last - first for first, last in extents(block.contact)]
     contact = block.contact
-    bending = free_bending(length=max(sides), thickness=thickness, modulus=block.young_modulus,
-                           density=block.mass / (contact.area * thickness))
-    is_slab = not isinstance(contact, Plan) or contact.area > _FILLED * math.prod(sides)
-    return Rigidity(bending, heave, speed[1], max(sides), thickness, is_slab)
+    plan = [last - first for first, last in extents(contact)]
+    # A block may stand on its narrow side, or higher than it is long.
+    least, middle, longest = sorted([*plan, thickness])
+    density = block.mass / (contact.area * thickness)
+    bending = free_bending(length=longest, thickness=least, modulus=block.young_modulus,
+                           density=density)
+    is_slab = not isinstance(contact, Plan) or contact.area > _FILLED * math.prod(plan)
+    twist = math.inf if isinstance(contact, Circle) or not is_slab else free_twist(
+        length=longest, width=middle, thickness=least, modulus=block.young_modulus,
+        density=density)
+    return Rigidity(bending, twist, heave, speed[1], longest, middle, least, is_slab)
 
 
 def _heave(block: Foundation, ground: SoilModel, lowest: float) -> float:

@@ -1,5 +1,6 @@
 """A block is rigid as far as its first bending is above excitation and heave, and is said so."""
 
+from itertools import permutations
 import math
 from pathlib import Path
 
@@ -11,8 +12,8 @@ from rotorsoil_ros.case.design.rigidity import of_rigidity
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.plan import Part, Plan
-from rotorsoil_ros.ground.soil import Rectangle, RigidSoil, Soil
-from rotorsoil_ros.machine.flexible.rigidity import free_bending, rigidity
+from rotorsoil_ros.ground.soil import Circle, Rectangle, RigidSoil, Soil
+from rotorsoil_ros.machine.flexible.rigidity import free_bending, free_twist, rigidity
 from rotorsoil_ros.machine.foundation import Foundation, solid_inertia
 
 FAN = Path(__file__).parents[3] / 'config' / 'plant_fan.yaml'
@@ -29,6 +30,19 @@ def test_free_slab_bends_as_three_dimensional_finite_elements_say(
     # Quadratic 27-node bricks, E 30 GPa, nu 0.2, 2400 kg/m^3; the formula is within 7 %.
     found = free_bending(length=length, thickness=thickness, modulus=30e9, density=2400.0)
     assert found / (2.0 * math.pi) == pytest.approx(by_elements, rel=0.07)
+
+
+@pytest.mark.parametrize('length, width, thickness, by_elements', [
+    (6.0, 6.0, 0.6, 37.7), (6.0, 6.0, 1.5, 83.6), (4.0, 4.0, 2.0, 195.4), (10.0, 9.0, 0.8, 20.3),
+    (6.0, 4.5, 0.4, 33.9), (2.0, 2.0, 2.0, 521.8), (3.0, 2.0, 1.2, 303.6), (5.0, 5.0, 0.3, 27.8)])
+def test_free_slab_twists_as_three_dimensional_finite_elements_say(
+        length, width, thickness, by_elements):
+    # As above; a square slab bends half as high again.
+    found = free_twist(length=length, width=width, thickness=thickness, modulus=30e9,
+                       density=2400.0)
+    assert found / (2.0 * math.pi) == pytest.approx(by_elements, rel=0.09)
+    bent = free_bending(length=length, thickness=thickness, modulus=30e9, density=2400.0)
+    assert found < bent
 
 
 def test_slender_slab_is_the_beam_of_euler_and_bernoulli():
@@ -61,6 +75,25 @@ def test_rectangle_in_two_parts_is_a_slab_and_an_l_is_said_not_to_be():
     assert same.bending == pytest.approx(one.bending, rel=1e-12)
     assert same.is_slab
     assert not other.is_slab
+
+
+def test_block_twists_or_bends_whichever_way_it_stands():
+    """A slab of three sides has one lowest frequency, and a disc does not twist like a square."""
+    sides = (1.0, 3.0, 8.0)
+    found = []
+    for width, length, height in permutations(sides):
+        contact = Rectangle(0.5 * width, 0.5 * length)
+        found.append(rigidity(block(contact, 2400.0 * math.prod(sides), height),
+                              ConeModel(SOIL, contact), (1.0, 150.0)))
+    assert [one.lowest for one in found] == pytest.approx([found[0].lowest] * 6)
+    # By bricks, E 30 GPa; the wall of 8 x 1 m, 3 m high, bends sideways.
+    assert found[0].lowest / (2.0 * math.pi) == pytest.approx(54.6, rel=0.07)
+    square = Rectangle(3.0, 3.0)
+    twists = rigidity(block(square, 2400.0 * 21.6, 0.6), ConeModel(SOIL, square), (1.0, 150.0))
+    assert twists.lowest == twists.twist
+    assert twists.over_excitation == pytest.approx(37.7 * 2.0 * math.pi / 150.0, rel=0.09)
+    disc = Circle(3.0)
+    assert rigidity(block(disc), ConeModel(SOIL, disc), (1.0, 150.0)).twist == math.inf
 
 
 def test_nothing_is_said_of_a_block_on_rigid_ground_or_without_a_body():
