@@ -230,6 +230,8 @@ def test_bad_input_is_one_line_and_status_2(arguments, problem, capfd):
      "rotorsoil response: argument --rpm: must rise from start >= 0 to a finite stop, "
      "got '2:1:5'"),
     (['response', PAPER, '--rpm', '-2:1:5'], 'rotorsoil response: argument --rpm: '),
+    (['study', PAPER, '--rpm', '300', '--vary', 'soil.density=-1:-2:3'],
+     "rotorsoil study: argument --vary: must rise from start to a finite stop, got '-1:-2:3'"),
     (['response', PAPER, '--rpm', '0:nan:5'], 'rotorsoil response: argument --rpm: must rise'),
     (['response', PAPER, '--rpm', '0:inf:5'], 'rotorsoil response: argument --rpm: must rise'),
     (['response', PAPER, '--rpm', '0:1:0'],

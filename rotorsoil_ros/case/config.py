@@ -182,6 +182,8 @@ def load(
     """
     path, own = document.chosen(path)
     content = document.read(path)
+    if own and 'machines' not in content:
+        raise InputError(f'{path}: machines: is missing, and {own[0]} names one of them')
     document.override(content, [*own, *overrides])
     return case_of(path, content, cache_directory=cache_directory)
 

@@ -50,8 +50,8 @@ class Sweep:
     count: int
 
     @classmethod
-    def parse(cls, text: str) -> 'Sweep':
-        """Return the sweep that a command line asks for."""
+    def parse(cls, text: str, *, lowest: float = 0.0) -> 'Sweep':
+        """Return the sweep that a command line asks for, from a lowest value on."""
         try:
             # One number stands for itself.
             start, stop, count = text.split(':') if ':' in text else (text, text, '1')
@@ -59,9 +59,10 @@ class Sweep:
         except ValueError as error:
             raise argparse.ArgumentTypeError(
                 f'must be start:stop:count, ends included, got {text!r}') from error
-        if not (0.0 <= sweep.start <= sweep.stop < math.inf):
+        if not (lowest <= sweep.start <= sweep.stop < math.inf and sweep.start > -math.inf):
+            least = f' >= {lowest:g}' if lowest > -math.inf else ''
             raise argparse.ArgumentTypeError(
-                f'must rise from start >= 0 to a finite stop, got {text!r}')
+                f'must rise from start{least} to a finite stop, got {text!r}')
         if not 1 <= sweep.count <= LONGEST_SWEEP:
             raise argparse.ArgumentTypeError(
                 f'must have 1 to {LONGEST_SWEEP} values, got {text!r}')
@@ -92,7 +93,7 @@ def choices(text: str) -> tuple[str, list[float]]:
     key, _, told = text.partition('=')
     try:
         if told.count(':') == 2:
-            sweep = Sweep.parse(told)
+            sweep = Sweep.parse(told, lowest=-math.inf)
             step = (sweep.stop - sweep.start) / max(sweep.count - 1, 1)
             values = [sweep.start + step * index for index in range(sweep.count)]
         else:

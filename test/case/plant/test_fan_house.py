@@ -272,6 +272,11 @@ def test_what_is_wrong_with_a_plant_is_one_clear_line(settings, line):
             line]
 
 
+def test_name_of_one_of_several_belongs_to_a_file_of_several():
+    assert faults(Path(f'{FAN}#fan_1')) == [
+        f'{FAN}: machines: is missing, and source=fan_1 names one of them']
+
+
 def test_check_of_all_machines_does_not_ask_for_one(tmp_path, capsys, cache):
     def wrong(content):
         content['machines'][0]['rated_rpm'] = 'fast'
