@@ -106,6 +106,10 @@ class Watch:
         self._node.get_logger().info(f'{self.name}: ' + greeting(
             self._hearing, self.monitor.table.channels,
             (rad_s_to_rpm(lowest), rad_s_to_rpm(highest))))
+        if beside := list(self._ground_topics()):
+            self._node.get_logger().info(
+                f'{self.name}: hears sensors on the ground on {" and ".join(beside)} '
+                '(sensor_msgs/msg/Imu)')
         self.monitor.begin(now_ns, self._description())
         self._ask()
 
@@ -229,12 +233,14 @@ class Watch:
 
     def _look_for_ground(self) -> None:
         """Hear sensors on the ground, which all machines of a plant share."""
+        self._raw_topics |= {topic: name for topic, name in self._ground_topics().items()
+                             if topic not in self._numbered}
+
+    def _ground_topics(self) -> dict[str, str]:
+        """Return the topics of these sensors, and their names below the machine or its plant."""
         place = self.name if self.plant is None else self.plant.name
-        for sensor in self._machine.case.sensors.ground:
-            name = f'ground/{sensor.name}/imu'
-            topic = self._node.resolve_topic_name(f'{place}/{name}')
-            if topic not in self._numbered:
-                self._raw_topics[topic] = name
+        names = [f'ground/{sensor.name}/imu' for sensor in self._machine.case.sensors.ground]
+        return {self._node.resolve_topic_name(f'{place}/{name}'): name for name in names}
 
     def _hear_sensors(self, topics: Collection[str]) -> None:
         """Subscribe to raw samples that somebody publishes; of most channels nobody does."""

@@ -75,7 +75,7 @@ def speak(bench, monitor, size, *, topic, speeds, count=500):
             bench.graph.executor.spin_once(timeout_sec=0.0)
 
 
-def test_part_of_the_ground_is_told_for_every_channel(benches, cache, on_ground):
+def test_part_of_the_ground_is_told_for_every_channel(benches, cache, on_ground, capfd):
     """Without a sensor on the machine: over the turns about each full second."""
     path = on_ground('plant_fan')
     machine, bench = rs.load(path, cache_directory=cache), benches(path)
@@ -83,6 +83,8 @@ def test_part_of_the_ground_is_told_for_every_channel(benches, cache, on_ground)
     amplitude, phase = (bench.hear(f'/rotorsoil/fan/ground/{name}') for name in (
         'amplitude', 'phase'))
     said = bench.hear('/diagnostics', DiagnosticArray)
+    assert ('fan: hears sensors on the ground on /fan/ground/yard/imu (sensor_msgs/msg/Imu)'
+            in capfd.readouterr().err)
     size = 2e-6 * np.exp(0.4j)
     speak(bench, monitor, size, topic='/fan/ground/yard/imu', speeds='/fan/joint_states')
     bench.graph.until(lambda: amplitude and phase, 'the part of the ground')
