@@ -8,19 +8,17 @@ from typing import Any
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray
-from rotorsoil_ros.bags.feed import feed, Inputs
+from rotorsoil_ros.bags.feed import described_unbalance, feed, Inputs, stand_beside
 from rotorsoil_ros.case import cache, config
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.zone_limits import ZoneLimits
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.machine.transmissibility import MovingGround
 from rotorsoil_ros.monitor.comparison import Comparison, Run
 from rotorsoil_ros.monitor.criteria import Expectation
 from rotorsoil_ros.monitor.ground.findings import GroundCollector
 from rotorsoil_ros.monitor.health import REDATED
 from rotorsoil_ros.monitor.monitor import Monitor
-from rotorsoil_ros.monitor.oil import Oils
 from rotorsoil_ros.monitor.points import Collector
 from rotorsoil_ros.monitor.rules import Judging, Matching, Rules
 from rotorsoil_ros.wire.speeds import SpeedSource, USUAL
@@ -105,8 +103,7 @@ def compare(
             case.uncertainty, shear_modulus_factor=wish.soil_factor))
     expectation = Expectation.of(case, cache.directory(cache_directory))
     machine = Machine(case, cache.directory(cache_directory))
-    reading = _Reading(inputs, expectation, machine.oils, machine.ground, wish, descriptions,
-                       progress)
+    reading = _Reading(inputs, expectation, machine, wish, descriptions, progress)
     found, hindsight = reading.read({})
     if hindsight:  # a slow roll that comes late is the runout of what was before it, too
         found, _ = reading.read(hindsight)
@@ -119,8 +116,7 @@ class _Reading:
 
     inputs: Inputs
     expectation: Expectation
-    oils: Oils
-    ground: MovingGround | None
+    machine: Machine
     wish: Wish
     descriptions: Descriptions
     progress: Progress | None
@@ -136,18 +132,18 @@ class _Reading:
             machine, expectation.table, expectation.case.unbalance,
             sinks=[collector, heard],
             judging=Judging(rules, self.wish.turns, sensors=expectation.case.sensors),
-            hindsight=hindsight, oils=self.oils, ground=self.ground)
+            hindsight=hindsight, oils=self.machine.oils, ground=self.machine.ground)
         monitor.judge.take_criteria(expectation.criteria(expectation.case.unbalance))
 
         def take(stamp_ns: int, description: Mapping[str, Any]) -> None:
-            unbalance = self._unbalance(description)
+            unbalance = described_unbalance(description, self.expectation.table)
             if unbalance is not None and not np.array_equal(unbalance, unbalances[-1][1]):
                 unbalances.append((stamp_ns, unbalance))
                 monitor.set_unbalance(unbalance)
                 monitor.judge.take_criteria(expectation.criteria(unbalance))
 
-        done = 0
-        for number in feed(self.inputs, monitor, {}, on_description=take):
+        done, beside = 0, stand_beside(self.machine, monitor, self.inputs)
+        for number in feed(self.inputs, monitor, {}, on_description=take, beside=beside):
             done += number
             if self.progress:
                 self.progress(done, self.inputs.number)
@@ -182,26 +178,13 @@ class _Reading:
             notes.append(f'{number} messages are malformed and were left out')
         if not self.descriptions:
             notes.append('the log holds no prediction: the case was asked, with its own unbalance')
-        elif any(self._unbalance(description) is None for _, description in self.descriptions):
+        elif any(described_unbalance(description, self.expectation.table) is None
+                 for _, description in self.descriptions):
             notes.append('the predictions in the log rest on another table than the case: the '
                          'case was asked anew, with its own unbalance')
         notes += [f'{number} {reason.replace("_", " ")}: dated on reception'
                   for reason in REDATED if (number := monitor.health.counts[reason])]
         return notes + list(self.inputs.remarks)
-
-    def _unbalance(self, description: Mapping[str, Any]) -> ComplexArray | None:
-        """Return the unbalance that a node took, if it answered from the table of the case."""
-        tables = description.get('tables')
-        if not isinstance(tables, Mapping) or (
-                tables.get('response') != self.expectation.table.key):
-            return None
-        try:
-            planes = {str(plane): float(value['moment_kg_m']) * complex(
-                np.exp(1j * float(value['phase_rad'])))
-                for plane, value in description['unbalance'].items()}
-        except (AttributeError, KeyError, TypeError, ValueError):
-            return None
-        return self.expectation.vector(planes)
 
 
 def _logged_case(

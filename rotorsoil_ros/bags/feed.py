@@ -1,5 +1,6 @@
 """How does a recorded run reach a monitor? Message by message, ticking at its own full seconds."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import json
@@ -7,6 +8,9 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.bags import reader as bag_reader
 from rotorsoil_ros.bags.profile import (
     ADVICE,
@@ -21,8 +25,12 @@ from rotorsoil_ros.bags.profile import (
 )
 from rotorsoil_ros.bags.reader import Source
 from rotorsoil_ros.case.config import Case
+from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import LAST_STAMP, NANOSECONDS
+from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.transient.poles import Poles
+from rotorsoil_ros.monitor.beside.companions import companions_of
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.wire.cdr import Cursor
 from rotorsoil_ros.wire.definitions import JOINT_STATE, STRING
@@ -106,11 +114,27 @@ class Inputs:
         return cls(bag, namespace, name, {
             topic: each for topic, each in found.items()
             if each.place.below in (f'{namespace}/{name}', beside if each.tells_ground else None)
-            or _is_nobodys(each)}, speed,
-            tuple(source.topic for source in sources
-                  if is_model(source.topic, source.type)
-                  and source.topic.endswith(f'/{name}/model')),
+            or _is_nobodys(each)}, speed, _models_of(name, sources),
             remarks | dict.fromkeys(missed))
+
+    def beside(self, other: Case) -> 'Inputs | None':
+        """
+        Return what tells the speed of another machine of the same plant, and nothing else.
+
+        None where no topic tells it and no node has answered that machine: where one has, it was
+        listened to in vain.
+        """
+        plant = self.machine.rpartition('/')[0]
+        name = f'{plant}/{other.name}' if plant else other.name
+        try:
+            found = Inputs.of(self.bag, machine=name, of=other)
+        except InputError:
+            found = self
+        if (found.namespace, found.machine) == (self.namespace, name):
+            return replace(found, topics={
+                topic: each for topic, each in found.topics.items() if each.tells_speed})
+        models = _models_of(name, bag_reader.sources(self.bag))
+        return replace(self, machine=name, topics={}, models=models) if models else None
 
     @property
     def number(self) -> int:
@@ -153,6 +177,11 @@ class Inputs:
             if (description := _description(batch.payloads[0])) is not None:
                 found.append((batch.log_time_ns[0], description))
         return found
+
+
+def _models_of(machine: str, sources: Iterable[Source]) -> tuple[str, ...]:
+    return tuple(source.topic for source in sources if is_model(source.topic, source.type)
+                 and source.topic.endswith(f'/{machine}/model'))
 
 
 def _chosen(
@@ -227,9 +256,53 @@ def _is_nobodys(each: Input) -> bool:
     return each.tells_speed and not each.place.machine
 
 
+@dataclass(frozen=True)
+class OtherMachine:
+    """A machine that runs beside another in a bag: what is told of it, and to whom."""
+
+    inputs: Inputs
+    monitor: Monitor
+
+    def on_description(self, stamp_ns: int, description: Mapping[str, Any]) -> None:
+        """Take the unbalance that a node took."""
+        unbalance = described_unbalance(description, self.monitor.table)
+        if unbalance is not None:
+            self.monitor.set_unbalance(unbalance)
+
+
+def stand_beside(machine: Machine, monitor: Monitor, inputs: Inputs) -> list[OtherMachine]:
+    """
+    Have a monitor take out what machines of the same plant do, as a bag tells their speeds.
+
+    Parameters
+    ----------
+    machine, monitor : Machine, Monitor
+        Who is watched.
+    inputs : Inputs
+        What is told of it.
+
+    Returns
+    -------
+    list of OtherMachine
+        Whom `feed` should hand what is told of them.
+
+    """
+    beside, others = [], list(machine.others())
+    for other in others:
+        if (told := inputs.beside(other.case)) is not None:
+            # Its part is asked for at its speed: what its own run-ups strike is not followed.
+            table = replace(other.table, poles=Poles.none('it is a machine beside another'))
+            beside.append(OtherMachine(told, Monitor(
+                other.case.name, table, other.case.unbalance, sinks=[])))
+    monitor.stand_beside(companions_of(machine, others, {
+        machine.case.name: monitor, **{each.monitor.machine: each.monitor for each in beside}}))
+    return beside
+
+
 def feed(
     inputs: Inputs, monitor: Monitor, description: Mapping[str, object], *,
     log: Outlet = lambda records: None, on_description: Described | None = None,
+    beside: Sequence[OtherMachine] = (),
 ) -> Iterator[int]:
     """
     Hand a run to a monitor, from its first message to its end; yield how many are done.
@@ -246,22 +319,30 @@ def feed(
         Where accepted messages are written.
     on_description : callable
         Takes what a node told of its model when the run was recorded, at its place in time.
+    beside : sequence of OtherMachine
+        Other machines whose speeds matter; their descriptions are followed where those are.
 
     """
-    inlets = inputs.inlets(monitor, log)
-    models = inputs.models if on_description is not None else ()
+    inlets: dict[str, list[Inlet]] = defaultdict(list)
+    models: dict[str, Described] = {}
+    for told, watched, follow in ((inputs, monitor, on_description), *(
+            (one.inputs, one.monitor, on_description and one.on_description) for one in beside)):
+        for topic, taken_in in told.inlets(watched, log).items():
+            inlets[topic].append(taken_in)
+        if follow is not None:
+            models |= dict.fromkeys(told.models, follow)
     # Where more is told than speeds, what belongs together has to come together.
     at_most, span_ns = (
         (AT_ONCE, NANOSECONDS) if inputs.tells_more else (SPEEDS_AT_ONCE, LAST_STAMP))
     second = now_ns = None
+    wanted = [inputs, *(one.inputs for one in beside)]
     for batch in bag_reader.batches(
             inputs.bag, lambda topic, kind: (
-                inputs.is_wanted(topic, kind)
+                any(each.is_wanted(topic, kind) for each in wanted)
                 or (topic in models and is_model(topic, kind))),
             at_most=at_most, span_ns=span_ns, tell=inputs.remarks.setdefault):
         if batch.topic in models:
-            assert on_description is not None
-            _tell(batch, on_description)
+            _tell(batch, models[batch.topic])
             continue
         if now_ns is None:
             monitor.begin(batch.log_time_ns[0], description)
@@ -269,9 +350,10 @@ def feed(
             monitor.tick(batch.log_time_ns[0] // NANOSECONDS * NANOSECONDS,
                          stale_after_s=math.inf)
         second = batch.log_time_ns[0] // NANOSECONDS
-        inlets[batch.topic](batch.log_time_ns, batch.payloads)
+        for take_in in inlets[batch.topic]:
+            take_in(batch.log_time_ns, batch.payloads)
         now_ns = batch.log_time_ns[-1]
-        yield len(batch.payloads)
+        yield len(batch.payloads) if batch.topic in inputs.topics else 0
     if now_ns is not None:
         monitor.tick(now_ns, stale_after_s=math.inf)
         monitor.finish(now_ns)
@@ -286,6 +368,22 @@ def _tell(batch: Records, on_description: Described) -> None:
     for stamp, payload in zip(batch.log_time_ns, batch.payloads, strict=True):
         if (description := _description(payload)) is not None:
             on_description(stamp, description)
+
+
+def described_unbalance(
+    description: Mapping[str, Any], table: ResponseTable,
+) -> ComplexArray | None:
+    """Return the unbalance that a node took, (p,) [kg m], if it answered from a table."""
+    tables = description.get('tables')
+    if not isinstance(tables, Mapping) or tables.get('response') != table.key:
+        return None
+    try:
+        planes = {str(plane): float(value['moment_kg_m']) * complex(
+            np.exp(1j * float(value['phase_rad'])))
+            for plane, value in description['unbalance'].items()}
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return None
+    return np.array([planes.get(plane, 0.0) for plane in table.planes], dtype=complex)
 
 
 def _description(payload: bytes) -> dict[str, Any] | None:

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rotorsoil_ros.bags.feed import feed, Inputs
+from rotorsoil_ros.bags.feed import feed, Inputs, stand_beside
 from rotorsoil_ros.bags.metadata import files
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
@@ -196,7 +196,8 @@ def predict(
         for each in heard:
             each.begin(monitor)
         done = 0
-        for number in feed(inputs, monitor, machine.description(name, unbalance), log=log.write):
+        for number in feed(inputs, monitor, machine.description(name, unbalance), log=log.write,
+                           beside=stand_beside(machine, monitor, inputs)):
             done += number
             for sink in viewer:
                 sink.flush()

@@ -58,11 +58,12 @@ class Machine(ModalAnswers):
         case = config.load(case_file, overrides, cache_directory=cache_directory)
         return cls(case, cache.directory(cache_directory))
 
-    def others(self) -> Iterator['Machine']:
-        """Yield the machines of the same plant that run beside it, each as the source."""
+    def others(self, known: Mapping[str, 'Machine'] | None = None) -> Iterator['Machine']:
+        """Yield the machines of the same plant that run beside it, as known or from its file."""
         berth = self.case.berth
         for name in () if berth is None else berth.running_beside:
-            yield Machine(self.case.changed([f'source={name}']), self.directory)
+            yield (known or {}).get(name) or Machine(
+                self.case.changed([f'source={name}']), self.directory)
 
     @cached_property
     def model(self) -> CoupledModel:

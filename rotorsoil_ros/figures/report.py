@@ -18,7 +18,7 @@ from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.identification.case import Identification
 from rotorsoil_ros.monitor.identification.sentence import in_a_sentence
 from rotorsoil_ros.monitor.passage import Passage
-from rotorsoil_ros.monitor.verdict import Verdict
+from rotorsoil_ros.monitor.verdict import percent, Verdict
 from rotorsoil_ros.units import rad_s_to_rpm, Units
 
 _DPI = 110
@@ -169,7 +169,8 @@ def page(
               f'{mode.damping_ratio:.3g}'] for mode in comparison.expectation.criticals])]
     if comparison.zones:
         parts += [f'<h2>Zones, {escape(comparison.rules.zones.label)}</h2>',
-                  '<p>Velocity of the 1X vector alone, a lower bound of the broadband value.</p>',
+                  '<p>Velocity of the 1X vector alone, of all machines together where there are '
+                  'several: a lower bound of the broadband value.</p>',
                   html.table(*zone_table(comparison))]
     if of_ground := ground_tables(comparison):
         parts += ['<h2>Ground that moves by itself</h2>',
@@ -238,11 +239,13 @@ def zone_table(
     """Return header and rows of the zones of the housings."""
     header = ['channel', 'source', 'zone', f'velocity [{scale.velocity_unit} rms]',
               f'speed [{scale.speed_unit}]', 'support', f'limits [{scale.velocity_unit} rms]',
-              'constant speed']
+              'constant speed', *(['shares'] if any(
+                  entry.shares for entry in comparison.zones) else [])]
     rows = [[entry.channel, entry.source, entry.zone, _number(scale.velocity * entry.velocity),
              f'{scale.speed * entry.speed:.4g}', entry.support,
              ' / '.join(f'{scale.velocity * limit:g}' for limit in entry.limits),
-             'yes' if entry.is_steady else 'no'] for entry in comparison.zones]
+             'yes' if entry.is_steady else 'no', percent(entry.shares)][:len(header)]
+            for entry in comparison.zones]
     return header, rows
 
 

@@ -125,6 +125,7 @@ class Comparison:
                 *self._of_peaks()]
 
     def _of_the_case(self) -> Iterator[str]:
+        yield from () if self.account.beside is None else self.account.beside.lines()
         if said := self.account.suspicion.said:
             yield said
         if self.expectation.note:
@@ -143,6 +144,10 @@ class Comparison:
                 yield (f'{channel.channel}: no vector near the slow-roll speed of '
                        f'{rad_s_to_rpm(slow_roll):.0f} rpm: no runout subtracted')
         for entry in self.zones:
+            if not entry.zone:
+                yield (f'{entry.channel}: no zone {entry.source}: at least '
+                       f'{1e3 * entry.velocity:.3g} mm/s rms, as not every machine that shakes '
+                       'it is known')
             if entry.source == 'measured' and not entry.is_steady:
                 yield (f'{entry.channel}: no constant speed in the run; its zone is the worst in '
                        'passing')

@@ -3,12 +3,15 @@
 from collections import deque
 from collections.abc import Iterator
 import math
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rotorsoil_ros.arrays import BoolArray, FloatArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import NANOSECONDS, Reason, Weighed
+from rotorsoil_ros.compared import Reason, Weighed
+from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.rules import Rules
 
 HYSTERESIS = 0.05  # share by which it has to be better before the better is believed again
@@ -22,6 +25,16 @@ def is_inside(
 ) -> BoolArray:
     """Return which values lie between two bounds, widened by a share on either side."""
     return np.asarray((value >= (1.0 - margin) * low) & (value <= (1.0 + margin) * high))
+
+
+def is_banded(reason: npt.NDArray[Any]) -> BoolArray:
+    """Return which points are held against the band, the wider one of machines beside it too."""
+    return np.asarray((reason == Reason.USED) | (reason == Reason.BESIDE))
+
+
+def is_mixed(reason: npt.NDArray[Any]) -> BoolArray:
+    """Return which points hold a part of another machine that is not told apart."""
+    return np.asarray((reason == Reason.BESIDE) | (reason == Reason.NOT_APART))
 
 
 class BandShare:
@@ -94,4 +107,5 @@ class BandShare:
         compared = weighed.compared
         inside = is_inside(compared.amplitude, compared.low, compared.high,
                            margin=self._rules.amplitude_margin)
-        return inside, np.asarray((weighed.reason == Reason.USED) & np.isfinite(compared.low))
+        return inside, np.asarray(
+            is_banded(weighed.reason) & np.isfinite(compared.low + compared.high))

@@ -1,6 +1,6 @@
 """Does the machine behave as predicted? Measured vectors against the answers, while it runs."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import math
 from typing import Any
 
@@ -10,22 +10,23 @@ import numpy.typing as npt
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.case.summary import unstable
 from rotorsoil_ros.channel import ACROSS, Channel
+from rotorsoil_ros.compared import Compared, Reason, Weighed
 from rotorsoil_ros.events import (
     Band,
-    Compared,
     Event,
     Expected,
     Level,
     Measured,
     NANOSECONDS,
     Predicted,
-    Reason,
     Remark,
     Samples,
-    Weighed,
 )
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.machine.transient.state import Transient
+from rotorsoil_ros.monitor.beside.apart import Apart
+from rotorsoil_ros.monitor.beside.companions import Companion, Companions
+from rotorsoil_ros.monitor.beside.parting import MEMORY_S
 from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.monitor.inside import BandShare
 from rotorsoil_ros.monitor.quasistatic import Pace, Unsettled
@@ -87,6 +88,13 @@ class Judge:
         comparer = self._comparer
         comparer.predictor, comparer.transient, comparer.envelope = predictor, transient, None
 
+    def stand_beside(self, others: Sequence[Companion]) -> None:
+        """Take what other machines do out of what is measured from now on."""
+        apart = Apart(Companions(self.history, others, turns=self._judging.turns))
+        self._comparer.stand_beside(apart)
+        self._zones.machines = [self.machine.rpartition('/')[2], *(one.name for one in others)]
+        self.account.beside = apart.heard
+
     def take_criteria(self, criteria: Criteria) -> None:
         """Judge by a band, resonances and natural speeds from now on."""
         self._comparer.envelope = criteria.envelope
@@ -134,6 +142,7 @@ class Judge:
             known = self._demodulators[samples.channel] = Demodulator(
                 self.machine, samples.channel, self.history, turns=self._judging.turns,
                 pickup=self._judging.sensors.of(samples.channel))
+            known.apart = self._comparer.apart
         known.take(samples)
 
     def tick(self, now_ns: int, *, stale_after_s: float) -> Iterator[Event]:
@@ -153,6 +162,8 @@ class Judge:
         heard, self._heard = self._heard, []
         yield from self._settle(now_ns)
         yield from self._comparer.strangers(now_ns)
+        if self.account.beside is not None:
+            yield from self.account.beside.news(self.machine, now_ns)
         yield from self._teller.tell(
             now_ns, stale_after_s=stale_after_s, has_data=bool(heard),
             has_phase=any(np.isfinite(each.phase).any() for each in heard),
@@ -189,12 +200,7 @@ class Judge:
         self._zones.close(now_ns)
         now = self.history.last_speed
         if math.isfinite(now):
-            row = self._comparer.answers(
-                np.array([self.history.last_ns]), np.array([now]))[1][0]
-            self._zones.predict(
-                {name: now * abs(row[column]) / math.sqrt(2.0)
-                 for column, name in enumerate(self._comparer.predictor.channels)
-                 if name.is_housing and abs(row[column]) > 0.0}, now)
+            self._zones.predict(self._comparer.velocities(self.history.last_ns, now), now)
 
     def _counted(self, events: Iterable[Event]) -> Iterator[Event]:
         """Count the points that are weighed for good, and hand everything on."""
@@ -222,8 +228,10 @@ class Judge:
         speed = compared.speed[:, None]
         floor = np.maximum(rules.matching.noise, ABOVE_NOISE * np.maximum(
             compared.deviation, [self.runout.scatter(name) for name in compared.channels]))
+        mixed_s = math.nan if compared.beside is None else compared.beside.mixed_s
         reason = np.full(compared.amplitude.shape, Reason.USED, dtype=object)
         for why, holds in (  # the last that holds is told
+                (Reason.BESIDE, mixed_s >= MEMORY_S), (Reason.NOT_APART, mixed_s < MEMORY_S),
                 (Reason.STILL_RINGS if self._is_followed else Reason.NOT_QUASI_STATIC,
                  ~(lag[:, None] <= rules.largest_lag)),
                 (Reason.NO_PREDICTION, ~np.isfinite(compared.predicted)),
@@ -293,6 +301,8 @@ class Judge:
             'without_speed': self._comparer.pairing.given_up,
             'samples_left_out': sum(each.left_out for each in self._demodulators.values()),
             'raw_channels': len(self._demodulators)}
+        if self.account.beside is not None:
+            found |= self.account.beside.values()
         for channel, refusals in self.refusals.items():
             found |= {f'{channel}_{key}': value for key, value in refusals.values().items()}
         return found

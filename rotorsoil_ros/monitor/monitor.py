@@ -20,14 +20,16 @@ from rotorsoil_ros.events import (
     Samples,
     Sink,
 )
-from rotorsoil_ros.machine.response import ResponseTable
+from rotorsoil_ros.machine.response import Predictor, ResponseTable
 from rotorsoil_ros.machine.transient.state import Transient
 from rotorsoil_ros.machine.transmissibility import MovingGround
+from rotorsoil_ros.monitor.beside.companions import Companion
 from rotorsoil_ros.monitor.ground.attribution import Attribution
 from rotorsoil_ros.monitor.health import Health, STANDING, STANDSTILL
 from rotorsoil_ros.monitor.judge import Judge
 from rotorsoil_ros.monitor.oil import Oils, OilTables
 from rotorsoil_ros.monitor.rules import Judging
+from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.prediction import Prediction
 from rotorsoil_ros.units import rad_s_to_rpm, SPEED_UNITS
 
@@ -60,7 +62,24 @@ class Monitor:
         self._predictor, self._transient = table.predictor(unbalance), Transient(table.poles)
         self.judge = Judge(machine, self._predictor, judging or Judging(),
                            transient=self._transient, hindsight=hindsight)
+        self._beside: Sequence[Companion] = ()
         self._listen(ground, judging)
+
+    @property
+    def predictor(self) -> Predictor:
+        """What its predictions are looked up in now."""
+        return self._predictor
+
+    @property
+    def history(self) -> History:
+        """What is told of its speed."""
+        return self.judge.history
+
+    def stand_beside(self, others: Sequence[Companion]) -> None:
+        """Take the parts of other machines out of what is measured of this one from now on."""
+        self._beside = tuple(others)
+        if others:
+            self.judge.stand_beside(others)
 
     def _listen(self, ground: MovingGround | None, judging: Judging | None) -> None:
         """Hear sensors on the ground, where there are any."""
@@ -110,6 +129,7 @@ class Monitor:
         self.judge = Judge(self.machine, self._predictor, judging or Judging(),
                            transient=self._transient)
         self._listen(ground, judging)
+        self.stand_beside(self._beside)
 
     def _stand_on(self, table: ResponseTable) -> None:
         self.table, self._transient = table, Transient(table.poles)

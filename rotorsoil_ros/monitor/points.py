@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Event, Predicted, Reason, Weighed
+from rotorsoil_ros.compared import Reason, Weighed
+from rotorsoil_ros.events import Event, Predicted
 from rotorsoil_ros.monitor.inside import is_inside
 
 _PER_CHANNEL = ('amplitude', 'phase', 'predicted', 'low', 'high', 'behind', 'ahead')

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Reason, Weighed
+from rotorsoil_ros.compared import Reason, Weighed
 
 # From vectors and their omega to what they would be, had this not happened to them.
 UNDO: dict[str, Callable[[ComplexArray, FloatArray], ComplexArray]] = {

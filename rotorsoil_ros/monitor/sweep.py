@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Event, Level, NANOSECONDS, Reason, Remark, Weighed
+from rotorsoil_ros.compared import Reason, Weighed
+from rotorsoil_ros.events import Event, Level, NANOSECONDS, Remark
+from rotorsoil_ros.monitor.inside import is_banded, is_mixed
 from rotorsoil_ros.monitor.passage import (
     Allowed,
     is_decided,
@@ -177,8 +179,9 @@ class Sweeps:
         """Take points whose pace is settled."""
         self._held.append(weighed)
         compared = weighed.compared
-        moves = np.isfinite(compared.speed)
         for column, channel in enumerate(compared.channels):
+            # Where another machine comes and goes in the vectors, no peak is this one's.
+            moves = np.isfinite(compared.speed) & ~is_mixed(weighed.reason[:, column])
             new = Trace(compared.stamp_ns, compared.speed, weighed.rate,
                         compared.amplitude[:, column], np.abs(compared.predicted[:, column]),
                         compared.low[:, column], compared.high[:, column]).rows(moves)
@@ -337,5 +340,5 @@ def _led_astray(block: Sequence[Weighed], lag: Lag, largest: float) -> Iterator[
         astray = share[begin:begin + len(each.rate)] > largest
         begin += len(each.rate)
         reason = each.reason.copy()
-        reason[astray[:, None] & (reason == Reason.USED)] = Reason.NOT_QUASI_STATIC
+        reason[astray[:, None] & is_banded(reason)] = Reason.NOT_QUASI_STATIC
         yield replace(each, reason=reason)

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
+import math
 
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import Diagnostics, Event, Level, NANOSECONDS, Remark, Zoned
+from rotorsoil_ros.monitor.beside.heard import HeardBeside
 from rotorsoil_ros.monitor.inside import BandShare
 from rotorsoil_ros.monitor.passage import peak_fault, PeakPair
 from rotorsoil_ros.monitor.rules import Rules
@@ -36,6 +38,7 @@ class Account:
         self.rules, self.band, self.zones, self.sweeps = rules, band, zones, sweeps
         self.suspicion = suspicion
         self._of_case = of_case
+        self.beside: HeardBeside | None = None
 
     @property
     def inside(self) -> dict[Channel, float]:
@@ -63,8 +66,11 @@ class Account:
             return  # amplitudes of another unit speak neither for the machine nor against
         for channel, share in self.inside.items():
             if share < rules.inside_share:
-                yield channel, (f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the '
-                                f'band, {100 * rules.inside_share:.0f} % should')
+                mixed = [] if self.beside is None else self.beside.mixed_at(channel)
+                yield channel, (
+                    f'{channel}: {100 * share:.0f} % of the amplitudes lie inside the band, '
+                    f'{100 * rules.inside_share:.0f} % should'
+                    + (f'; {", ".join(mixed)} may be why, not told apart' if mixed else ''))
         for peak in self.peaks:
             if fault := peak_fault(peak, margin=rules.critical_margin):
                 yield peak.channel, fault
@@ -72,7 +78,7 @@ class Account:
             if entry.source == 'measured' and entry.zone == 'D' and entry.is_steady:
                 yield entry.channel, (
                     f'{entry.channel}: zone D, {MM * entry.velocity:.2f} mm/s rms measured at '
-                    f'{rad_s_to_rpm(entry.speed):.0f} rpm')
+                    f'{rad_s_to_rpm(entry.speed):.0f} rpm{shared(entry.shares)}')
 
     def verdict(self) -> Verdict:
         """Failing for any reason; undecided where nothing could be held against anything."""
@@ -166,7 +172,7 @@ class Teller:
                 came = f' (was {before})' if before else ''
                 yield Remark(self._machine, now_ns, _level(state, is_steady),
                              f'{channel}: zone {state.zone}{came}, '
-                             f'{MM * state.velocity:.2f} mm/s rms')
+                             f'{MM * state.velocity:.2f} mm/s rms{shared(state.shares)}')
         for channel, is_outside in self._account.band.settle():
             said = 'has left' if is_outside else 'is back in'
             share = 100.0 * self._account.band.recent(channel)
@@ -180,6 +186,9 @@ class Teller:
         for source, states in (('measured', zones.measured), ('predicted', zones.predicted)):
             if found := worst_state(states):
                 said.append(_zone(source, *found))
+            elif missing := {name for state in states.values()
+                             for name, share in state.shares.items() if math.isnan(share)}:
+                said.append(f'{source} no zone: nothing is known of {", ".join(sorted(missing))}')
         if found := worst_state(zones.measured):
             level = _level(found[1], is_steady)
             if level is not LEVELS[found[1].zone or 'A']:
@@ -215,6 +224,8 @@ class Teller:
                 found[f'{channel}_{source}_mm_s_rms'] = MM * state.velocity
                 found[f'{channel}_{source}_zone'] = state.zone or ''
                 found[f'{channel}_{source}_support'] = state.support or ''
+                if state.shares:
+                    found[f'{channel}_{source}_shares'] = percent(state.shares)
                 if source == 'measured':
                     found[f'{channel}_alarm_mm_s_rms'] = MM * state.alarm
                     found[f'{channel}_trip_mm_s_rms'] = MM * state.trip
@@ -236,4 +247,16 @@ def _level(state: HousingState, is_steady: Callable[[], bool]) -> Level:
 
 def _zone(source: str, channel: str, state: HousingState) -> str:
     return (f'zone {state.zone} {source} ({channel}, {MM * state.velocity:.2f} mm/s rms, '
-            f'{state.support} support)')
+            f'{state.support} support{shared(state.shares)})')
+
+
+def percent(shares: Mapping[str, float]) -> str:
+    """Return what each of several machines has in a velocity; nothing where that is not known."""
+    return ', '.join(f'{name} not known' if math.isnan(share) else f'{name} {share:.0%}'
+                     for name, share in shares.items())
+
+
+def shared(shares: Mapping[str, float]) -> str:
+    """Return what each of several machines has in a velocity, in words; nothing of one."""
+    missing = any(map(math.isnan, shares.values()))
+    return f', {"at least, " if missing else ""}of its square {percent(shares)}' if shares else ''

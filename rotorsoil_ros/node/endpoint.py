@@ -155,6 +155,11 @@ class Watch:
             self._node.destroy_lifecycle_publisher(publisher)
 
     @property
+    def machine(self) -> Machine:
+        """What is watched."""
+        return self._machine
+
+    @property
     def _is_shown(self) -> bool:
         """Whether the viewer, which was opened with the first case, knows the channels."""
         return self._machine.table.channels == self._shown_channels

@@ -1,6 +1,6 @@
 """The node: its life cycle around one watch per machine, and the process that runs it."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from functools import partial
 import gc
@@ -38,7 +38,7 @@ from rotorsoil_ros.node.parameters import described
 from rotorsoil_ros.node.reload import Reloader
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 from rotorsoil_ros.node.settings import key, of_discs, Settings
-from rotorsoil_ros.node.together import refuse_clashes, Together, told_of
+from rotorsoil_ros.node.together import acquaint, refuse_clashes, Together, told_of
 from rotorsoil_ros.stop import Stop
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS
 from rotorsoil_ros.wire.messages import diagnostic_array, DIAGNOSTICS_TOPIC, NODE_NAME, Records
@@ -181,11 +181,18 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
                 bench=bench, told=told_of(name, machines, plants, self.settings),
                 plant=self._plants.get(name))
             self._held.callback(watch.destroy)
+        self._acquaint(machines)
         for entry in self.settings.files:
             self._reloaders[entry] = reloader = Reloader(
                 self, entry, load=partial(self._load_again, entry),
                 take=partial(self._take, entry))
             self._held.callback(reloader.destroy)
+
+    def _acquaint(self, names: Collection[str]) -> None:
+        """Let machines, and those on the same blocks, know of each other."""
+        watches = self._watches.items()
+        acquaint(names, {name: watch.machine for name, watch in watches},
+                 {name: watch.monitor for name, watch in watches})
 
     def _hand_out(self, slips: Sequence[str]) -> None:
         """Let each machine tell what is wrong with how it was set up; the first what is of all."""
@@ -223,6 +230,7 @@ class RotorsoilNode(LifecycleNode):  # type: ignore[misc]
         if plant is not None and plant.name == entry:
             plant.take_channels(machine.table.channels)
         said = {watch.take_machine(machines[watch.name]) for watch in watches}
+        self._acquaint(machines)
         return f'{entry}: reloaded {machine.case.path}{"".join(said)}'
 
     def _forget(self) -> None:

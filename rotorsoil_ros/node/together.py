@@ -1,7 +1,7 @@
 """What the machines of one plant do together, told once a second."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 import math
 from typing import NamedTuple
@@ -13,10 +13,11 @@ from sensor_msgs.msg import JointState
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.case.machine import Machine
-from rotorsoil_ros.case.plant.together import Beat, Shaken
+from rotorsoil_ros.case.plant.together import Beat, plants_of, Shaken
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.events import Diagnostics, Event, Level, Predicted
+from rotorsoil_ros.monitor.beside.companions import companions_of
 from rotorsoil_ros.monitor.monitor import Monitor
 from rotorsoil_ros.node.hearing import Told
 from rotorsoil_ros.node.run_log import RunLog
@@ -84,10 +85,6 @@ class Together:
     def join(self, monitor: Monitor) -> None:
         """Know the monitor of one of the machines."""
         self.monitors[monitor.machine] = monitor
-
-    def beside(self, name: str) -> dict[str, Monitor]:
-        """Return the monitors of the other machines: what they do, and at which speeds."""
-        return {other: monitor for other, monitor in self.monitors.items() if other != name}
 
     def destroy(self) -> None:
         """Leave the graph."""
@@ -157,6 +154,30 @@ class Together:
     ) -> None:
         publisher.publish(payload)
         self._log.write(Records(publisher.topic_name, kind, [stamp_ns], [payload]))
+
+
+def acquaint(
+    names: Collection[str], machines: Mapping[str, Machine], monitors: Mapping[str, Monitor],
+) -> None:
+    """
+    Let machines, and those on the same blocks, know what the others do at the speeds told of them.
+
+    Parameters
+    ----------
+    names : collection of str
+        Machines that are new, or others than before.
+    machines, monitors : mapping
+        By name all machines that are watched.
+
+    """
+    plants = plants_of(machines)
+    alone = {name: {name: machine} for name, machine in machines.items()
+             if not any(name in among for among in plants.values())}
+    for among in (plants | alone).values():
+        known = {machine.case.name: machine for machine in among.values()}
+        told = {machine.case.name: monitors[name] for name, machine in among.items()}
+        for name, machine in among.items() if among.keys() & set(names) else ():
+            monitors[name].stand_beside(companions_of(machine, [*machine.others(known)], told))
 
 
 def _beat(plant: str, stamp_ns: int, beat: Beat) -> Diagnostics:

@@ -8,7 +8,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
-from rotorsoil_ros.events import Compared, NANOSECONDS
+from rotorsoil_ros.compared import Compared
+from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.machine.response import Predictor

@@ -12,7 +12,8 @@ import rerun.blueprint as rrb
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.config import Case
 from rotorsoil_ros.channel import HOUSING
-from rotorsoil_ros.events import Compared, NANOSECONDS
+from rotorsoil_ros.compared import Compared
+from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.monitor.vectors.history import nearest
 from rotorsoil_ros.rotor.shaft import Orbit
 from rotorsoil_ros.screen.bode import MEASURED, PREDICTED

@@ -10,7 +10,8 @@ import rerun.blueprint as rrb
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.zone_limits import support_class, ZoneLimits
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Band, Compared, NANOSECONDS, Zoned
+from rotorsoil_ros.compared import Compared
+from rotorsoil_ros.events import Band, NANOSECONDS, Zoned
 from rotorsoil_ros.screen.channels import entity_of, HOUSINGS, MICRO, Trend
 from rotorsoil_ros.screen.recording import Recording, TREND_NS
 from rotorsoil_ros.units import rad_s_to_rpm

@@ -12,9 +12,9 @@ import rerun as rr
 from rotorsoil_ros.arrays import ComplexArray
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import plants_of
+from rotorsoil_ros.compared import Compared
 from rotorsoil_ros.events import (
     Band,
-    Compared,
     Diagnostics,
     Event,
     Expected,

@@ -11,9 +11,9 @@ import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.compared import Compared
 from rotorsoil_ros.events import (
     Band,
-    Compared,
     Demodulated,
     Diagnostics,
     Event,

@@ -12,8 +12,9 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.bags.synthetic import Truth, write_synthetic
 from rotorsoil_ros.bags.writer import LogFile
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.compared import Compared, Weighed
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import Compared, Remark, Weighed
+from rotorsoil_ros.events import Remark
 from rotorsoil_ros.figures.report import write_report
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.monitor import Monitor

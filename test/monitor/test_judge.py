@@ -10,18 +10,16 @@ import pytest
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.zone_limits import zone, ZoneLimits
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.compared import Compared, Reason, Weighed
 from rotorsoil_ros.events import (
     Band,
-    Compared,
     Demodulated,
     Diagnostics,
     Level,
     Measured,
     Predicted,
-    Reason,
     Remark,
     Samples,
-    Weighed,
     Zoned,
 )
 from rotorsoil_ros.machine.transient.poles import Poles

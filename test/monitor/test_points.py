@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.compared import Compared, Reason, Weighed
 from rotorsoil_ros.errors import RotorSoilError
-from rotorsoil_ros.events import Compared, Predicted, Reason, Weighed
+from rotorsoil_ros.events import Predicted
 from rotorsoil_ros.monitor.inside import BandShare
 from rotorsoil_ros.monitor.points import ChannelPoints, Collector, statistics
 from rotorsoil_ros.monitor.rules import Matching, Rules

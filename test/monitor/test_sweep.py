@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Compared, Level, Reason, Remark, Weighed
+from rotorsoil_ros.compared import Compared, Reason, Weighed
+from rotorsoil_ros.events import Level, Remark
 from rotorsoil_ros.monitor.quasistatic import Resonance
 from rotorsoil_ros.monitor.rules import Rules
 from rotorsoil_ros.monitor.sweep import SweepFinder, Sweeps

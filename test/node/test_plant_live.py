@@ -100,6 +100,35 @@ def test_each_machine_answers_its_part_and_the_total_adds_them(bench, cache, nam
     np.testing.assert_allclose(total[-1].position, parts[0][-1].position, rtol=1e-12)
 
 
+def test_part_of_another_machine_is_no_residual(bench, cache):
+    """Equally fast for ever: the vector holds both parts, of which nobody knows whose is whose."""
+    bench.active('fan_house', fan_house__case='fan_house')
+    residual = bench.hear('/rotorsoil/fan_house/fan_1/residual')
+    said = bench.hear('/diagnostics', DiagnosticArray)
+    speed, other = (bench.speaker(f'/{name}/joint_states') for name in BOTH)
+    measured = {name: bench.speaker(f'/{BOTH[0]}/measured/{name}', listeners=())
+                for name in ('amplitude', 'phase')}
+    found = Plant.load(HOUSE, cache_directory=cache).shaken(
+        rpm=dict.fromkeys(('fan_1', 'fan_2'), rad_s_to_rpm(150.0)))
+    channel = 'fan_1_fan_end_housing_x'
+    own, part = found.displacement[:, found.channels.index(channel)]
+    for number in range(3):
+        at = STAMP + number * 10**8
+        speed(joint_state([150.0], stamp=at))
+        other(joint_state([150.0], stamp=at))
+        vector = own + np.exp(0.4j) * part
+        for name, value in (('amplitude', abs(vector)), ('phase', np.angle(vector))):
+            measured[name](JointState(header=joint_state([0.0], stamp=at).header, name=[channel],
+                                      position=[float(value)]))
+    bench.graph.until(lambda: len(residual) == 3, 'the residuals')
+    assert abs(part) > 0.1 * abs(own)
+    # Of the first nothing is known before it: the speed of the other is not yet.
+    assert max(one.position[0] for one in residual[1:]) < 1e-9 * abs(part)
+    bench.graph.until(lambda: any(
+        value.key == 'fan_2_is' and value.value == 'not told apart'
+        for status in statuses(said) for value in status.values), 'that it is said')
+
+
 def test_one_message_tells_the_speeds_of_a_plant_by_its_joints(bench, cache, tmp_path):
     node = bench.active('hall', hall__case='fan_house', hall__fan_2__rotor_joint='right',
                         hall__fan_2__speed__unit='rpm', log__directory=str(tmp_path))

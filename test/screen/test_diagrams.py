@@ -7,7 +7,8 @@ import pytest
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.models import coupled_model
-from rotorsoil_ros.events import Compared, Model, Predicted, Samples
+from rotorsoil_ros.compared import Compared
+from rotorsoil_ros.events import Model, Predicted, Samples
 
 rr = pytest.importorskip('rerun', reason='rerun-sdk is optional')
 

@@ -6,17 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
+from rotorsoil_ros.compared import Compared
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.events import (
-    Band,
-    Compared,
-    Diagnostics,
-    Expected,
-    Level,
-    Model,
-    Remark,
-    Zoned,
-)
+from rotorsoil_ros.events import Band, Diagnostics, Expected, Level, Model, Remark, Zoned
 from rotorsoil_ros.monitor.criteria import Criteria
 from rotorsoil_ros.node.run_log import LogSettings, RunLog
 from rotorsoil_ros.prediction import Prediction

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Weighed
+from rotorsoil_ros.compared import Weighed
 from rotorsoil_ros.monitor.rules import Rules
 from rotorsoil_ros.monitor.zones import Zones
 
@@ -101,6 +101,7 @@ class GroundAccount:
         part = np.stack([parts.get(channel, nothing) for channel in compared.channels], axis=1)
         less = measured - part
         self.zones.natural = self._measured.natural
+        self.zones.machines = self._measured.machines
         self.zones.take(replace(weighed, compared=replace(
             compared, amplitude=np.abs(less), phase=np.angle(less))))
         for column, channel in enumerate(compared.channels):

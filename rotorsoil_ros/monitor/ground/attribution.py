@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.compared import Compared, Weighed
 from rotorsoil_ros.events import (
-    Compared,
     Diagnostics,
     Event,
     Grounded,
@@ -18,7 +18,6 @@ from rotorsoil_ros.events import (
     Measured,
     NANOSECONDS,
     Samples,
-    Weighed,
 )
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.machine.transmissibility import MovingGround

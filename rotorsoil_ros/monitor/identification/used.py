@@ -6,8 +6,8 @@ import numpy as np
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
+from rotorsoil_ros.compared import Reason
 from rotorsoil_ros.errors import NotSolvedError
-from rotorsoil_ros.events import Reason
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.identification.passing import Passing
 from rotorsoil_ros.monitor.points import ChannelPoints

@@ -8,10 +8,12 @@ import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Compared, Demodulated, Level, Measured, Remark
+from rotorsoil_ros.compared import Compared
+from rotorsoil_ros.events import Demodulated, Level, Measured, Remark
 from rotorsoil_ros.machine.band import Envelope
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.machine.transient.state import Transient
+from rotorsoil_ros.monitor.beside.apart import Apart
 from rotorsoil_ros.monitor.rules import Matching
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.pairing import Pairing, Runout, Vectors
@@ -31,6 +33,8 @@ class Comparer:
         The band, as soon as it is known.
     runout : Runout
         What is subtracted.
+    apart : Apart or None
+        What takes out the parts of other machines; None of one that is alone.
     pairing : Pairing
         What waits for its speed.
 
@@ -43,6 +47,7 @@ class Comparer:
         self._machine = machine
         self.predictor, self.transient = predictor, transient
         self.envelope: Envelope | None = None
+        self.apart: Apart | None = None
         self.pairing = Pairing(history, tolerance_s=matching.tolerance)
         self.runout = Runout(matching.slow_roll_speed, hindsight)
         self.paired: set[Channel] = set()
@@ -92,6 +97,23 @@ class Comparer:
             return None
         return self.envelope.at(speed).around(steady).opened(steady, moved)
 
+    def velocities(self, now_ns: int, speed: float) -> dict[Channel, FloatArray]:
+        """
+        Return how fast every housing moves at a speed [rad/s].
+
+        By this machine and by each beside it, (machines,) [m/s rms], NaN where it is not known.
+        """
+        row = self.answers(np.array([now_ns]), np.array([speed]))[1][0]
+        moved = {name: np.array([speed * abs(row[column]) / math.sqrt(2.0)])
+                 for column, name in enumerate(self.predictor.channels)
+                 if name.is_housing and abs(row[column]) > 0.0}
+        if self.apart is None:
+            return moved
+        others = self.apart.companions.latest(now_ns)
+        sizes = self.apart.companions.parts(others[None], tuple(moved))[0]
+        return {name: np.concatenate([own, others * size / math.sqrt(2.0)])
+                for (name, own), size in zip(moved.items(), sizes, strict=True)}
+
     def strangers(self, now_ns: int) -> Iterator[Remark]:
         """Tell once which measured channels no prediction has: a slip in a name, mostly."""
         new = sorted(self._unknown - self._told)[:MOST_NAMES]
@@ -122,7 +144,13 @@ class Comparer:
             low, high, behind, ahead = (
                 np.where(unknown, np.nan, part[:, columns])
                 for part in (band.low, band.high, band.behind, band.ahead))
-        return Compared(
+        compared = Compared(
             self._machine, stamps, speed, names, amplitude, phase,
             np.array([vectors.deviation for vectors in found]), predicted, low, high, behind,
             ahead)
+        return compared if self.apart is None else self.apart.less(
+            compared, [vectors.beside for vectors in found])
+
+    def stand_beside(self, apart: Apart) -> None:
+        """Take the parts of other machines out of what is measured from now on."""
+        self.apart, self.pairing.until = apart, apart.companions.heard_until

@@ -11,6 +11,7 @@ from rotorsoil_ros.arrays import FloatArray, IntArray
 from rotorsoil_ros.case.entries.sensors import Pickup
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.events import Demodulated, NANOSECONDS, Samples
+from rotorsoil_ros.monitor.beside.apart import Apart
 from rotorsoil_ros.monitor.vectors.axes import Axes, said_with
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.orders import (
@@ -21,7 +22,7 @@ from rotorsoil_ros.monitor.vectors.orders import (
 )
 from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
 from rotorsoil_ros.monitor.vectors.sampling import end_of_packet, unpacked
-from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE, Finding, Stretch, TOLD
+from rotorsoil_ros.monitor.vectors.stretch import ABOVE_NOISE, Finding, FITTED, Stretch, TOLD
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
 MOST_SAMPLES = 1 << 16  # samples of a channel that wait for their speed
@@ -57,6 +58,7 @@ class Demodulator:
         self.left_out = 0
         self.refusals = Refusals()
         self._scatter = Scatter()
+        self.apart: Apart | None = None  # who tells what other machines do to its vectors
 
     def take(self, samples: Samples) -> None:
         """Keep samples; the oldest are left out if nobody tells the speed."""
@@ -73,8 +75,10 @@ class Demodulator:
         if not self._parts or not len(told):
             return
         stamps, values, said = self._gathered(int(told[0]))
+        until = told[-1] if self.apart is None else (
+            min(told[-1], self.apart.companions.heard_until()))
         found = []
-        while (known := int(np.searchsorted(stamps, told[-1], side='right'))):
+        while (known := int(np.searchsorted(stamps, until, side='right'))):
             vector, taken = self._first(stamps[:known], values[:known], said[:known])
             if not taken:
                 break
@@ -122,19 +126,33 @@ class Demodulator:
             end = end_of_packet(time, end)
         if not end:
             return None, 0
+        beside = self._beside(stamps[:end], zero_ns, float(at.speed[end // 2]))
         found = self._found(at.rows(slice(0, end)), values[:end], said[:end], float(time[end]),
-                            track)
+                            track, list(beside.values()))
+        stamp_ns = 0
         if isinstance(found, OrderVector):
-            found = self._held_against_others(found)
+            stamp_ns = zero_ns + round(found.time * NANOSECONDS)
+            if self.apart is not None:
+                found = replace(found, beside=self.apart.companions.spread_out(
+                    list(beside), found.beside))
+            found = self._held_against_others(found, stamp_ns)
         self.refusals.note(found if isinstance(found, Refusal) else None)
         if isinstance(found, Refusal):
             self.left_out += end
             return None, end
-        return (zero_ns + round(found.time * NANOSECONDS), found), end
+        return (stamp_ns, found), end
+
+    def _beside(self, stamps: IntArray, zero_ns: int, speed: float) -> dict[int, SpeedTrack]:
+        """Return which other machines the samples of a stretch tell apart, and how they turned."""
+        if self.apart is None or self._pickup.comes_in_packets or len(stamps) < 2:
+            return {}
+        return self.apart.companions.told_apart(
+            self._channel, int(stamps[0]), int(stamps[-1]), zero_ns=zero_ns, own=speed,
+            orders=FITTED)
 
     def _found(
         self, at: Turning, values: FloatArray, said: FloatArray, until: float,
-        track: SpeedTrack,
+        track: SpeedTrack, beside: Sequence[SpeedTrack],
     ) -> OrderVector | Refusal:
         """Return the vector of a stretch, if its axes and unit are those of the machine."""
         if self._pickup.comes_in_packets:
@@ -148,7 +166,8 @@ class Demodulator:
         self.refusals.gravity = self._axes.words()
         if isinstance(along, Refusal):
             return along
-        finding = Finding(Stretch(at, along, peaks, until, self._turns, self._pickup), track)
+        finding = Finding(Stretch(at, along, peaks, until, self._turns, self._pickup,
+                                  beside=beside), track)
         found = finding.vector()
         self.refusals.left_out.update(finding.left_out)
         if isinstance(found, OrderVector) and self._pickup.comes_in_packets:
@@ -156,9 +175,12 @@ class Demodulator:
                 found.deviation, _OF_PACKETS * np.abs(found.displacement)))
         return found
 
-    def _held_against_others(self, found: OrderVector) -> OrderVector | Refusal:
+    def _held_against_others(
+        self, found: OrderVector, stamp_ns: int,
+    ) -> OrderVector | Refusal:
         """Return a vector with what its neighbours say of its error, which may be all of it."""
-        vector = self._scatter.widened(found)
+        vector = self._scatter.widened(found, moved=0.0 if self.apart is None else (
+            self.apart.moves(self._channel, stamp_ns, found.speed, found.beside)))
         if vector is not found:
             self.refusals.left_out[WIDENED] += 1
             if abs(vector.displacement[0]) < ABOVE_NOISE * vector.deviation[0]:
@@ -172,7 +194,8 @@ class Demodulator:
         return Demodulated(
             self._machine, self._channel, np.array([stamp for stamp, _ in found]),
             np.array([vector.speed for _, vector in found]), TOLD, np.abs(vectors),
-            np.angle(vectors) + told, np.array([vector.deviation[0] for _, vector in found]))
+            np.angle(vectors) + told, np.array([vector.deviation[0] for _, vector in found]),
+            np.array([vector.beside for _, vector in found]))
 
 
 class Scatter:
@@ -186,8 +209,18 @@ class Scatter:
     def __init__(self) -> None:
         self._latest: deque[OrderVector] = deque(maxlen=_LOOKED_AT)
 
-    def widened(self, vector: OrderVector) -> OrderVector:
-        """Return a vector with the deviation of its neighbours, where that is the larger one."""
+    def widened(self, vector: OrderVector, *, moved: float = 0.0) -> OrderVector:
+        """
+        Return a vector with the deviation of its neighbours, where that is the larger one.
+
+        Parameters
+        ----------
+        vector : OrderVector
+            The latest.
+        moved : float
+            By how much other machines may move vectors, which is no error [m].
+
+        """
         known = self._latest
         if known and (abs(vector.speed - known[0].speed) > _ONE_SPEED * known[0].speed
                       or vector.has_phase is not known[0].has_phase):
@@ -197,7 +230,7 @@ class Scatter:
             return vector
         scatter = self._deviation()
         stated = math.sqrt(float(np.mean([each.deviation[0]**2 for each in known])))
-        if not scatter > _LARGEST_RATIO * stated:
+        if not scatter > _LARGEST_RATIO * math.hypot(stated, moved):
             return vector
         # Of other orders nothing else is known.
         return replace(vector, deviation=np.maximum(vector.deviation, scatter))

@@ -93,6 +93,33 @@ class History:
         angles = angle if turns_with(time, speed, angle) else None
         return SpeedTrack(time, speed, angle=angles), int(stamps[0])
 
+    @property
+    def track_ns(self) -> int:
+        """The latest stamp up to which the track goes [ns]."""
+        return self._thinned_ns
+
+    def between(self, from_ns: int, until_ns: int, *, within_s: float) -> SpeedTrack | None:
+        """
+        Return the track across two stamps, in seconds since the first.
+
+        None where it does not reach across them, or has a gap longer than `within_s` [s].
+        """
+        rows: list[tuple[int, float, float]] = []
+        for row in reversed(self._track):
+            if row[0] >= until_ns:
+                rows = [row]
+            elif rows:
+                rows.append(row)
+            if len(rows) > 1 and row[0] <= from_ns:
+                break
+        else:
+            return None
+        stamps, speed, angle = (np.array(part) for part in zip(*reversed(rows), strict=True))
+        time = (stamps - from_ns) / NANOSECONDS
+        if np.diff(time).max() > within_s:
+            return None
+        return SpeedTrack(time, speed, angle=angle if turns_with(time, speed, angle) else None)
+
     def rate(self, over_s: float) -> float:
         """Return how fast the speed changed lately [rad/s^2]: a line through the last seconds."""
         stamps, speed, _ = self.track()

@@ -1,7 +1,8 @@
 """The once-per-turn vector that is in a measured signal."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import math
 from typing import Any
 
 import numpy as np
@@ -166,6 +167,10 @@ class OrderFit:
         What is left [m/s^2].
     turning : (n,) complex array
         exp(i theta).
+    beside : (m,) complex array
+        Displacement of other machines, at their own angles [m].
+    inflation : float
+        By how much an error of the first order is larger for their being fitted too [-].
 
     """
 
@@ -174,6 +179,8 @@ class OrderFit:
     white: FloatArray
     residual: FloatArray
     turning: ComplexArray
+    beside: ComplexArray
+    inflation: float = 1.0
 
     @property
     def power(self) -> float:
@@ -196,6 +203,8 @@ class OrderVector:
         Standard error of |X_n| by batch means of the residual [m].
     has_phase : bool
         Whether theta is the true rotor angle; else only |X_n| has a meaning.
+    beside : (m,) float array
+        Amplitude of what each of m other machines does [m], NaN where it is not told apart.
 
     """
 
@@ -204,6 +213,7 @@ class OrderVector:
     displacement: ComplexArray
     deviation: FloatArray
     has_phase: bool
+    beside: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 def demodulate(
@@ -240,9 +250,14 @@ def demodulate(
                        deviations(found, orders, speed=speed), track.has_phase)
 
 
-def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> OrderFit:
+def fit(
+    turning: Turning, acceleration: FloatArray, orders: Sequence[int],
+    beside: Sequence[Turning] = (),
+) -> OrderFit:
     """
     OrderFit displacement vectors of several orders, an offset and a drift to acceleration samples.
+
+    And one of each machine beside it, at the angle that it has turned.
 
     Raises
     ------
@@ -257,12 +272,12 @@ def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> Or
     needs no resampling, so that gaps and jitter bias nothing.
 
     """
-    number, unknowns = len(turning.time), 4 * len(orders) + 2
+    number, unknowns = len(turning.time), 4 * len(orders) + 2 * len(beside) + 2
     if turning.turns < _FEWEST_TURNS or number < _SAMPLES_PER_UNKNOWN * unknowns:
         raise NotSolvedError(f'a vector needs {_FEWEST_TURNS:g} turns and '
                              f'{_SAMPLES_PER_UNKNOWN * unknowns} samples or more, got '
                              f'{turning.turns:.2g} turns, {number} samples')
-    once, system = _system(turning, orders)
+    once, system = _system(turning, orders, beside)
     # Normal equations: columns of one length are nearly orthogonal, so that little is lost, and
     # they cost a fraction of a decomposition of all rows.
     gram = system @ system.T
@@ -275,14 +290,18 @@ def fit(turning: Turning, acceleration: FloatArray, orders: Sequence[int]) -> Or
     # What the smallest eigenvalue adds to the trace: no decomposition is needed to see it.
     if not 0.0 < np.trace(inverse) * len(gram) <= _WORST_CONDITION**2:
         raise NotSolvedError('the samples cannot tell the orders apart')
+    # Of orders alone, which whole turns part, it is one.
+    inflation = math.sqrt(max(inverse[0, 0], inverse[1, 1])) if beside else 1.0
     inverse /= scale * scale[:, None]
     solution = inverse @ (system @ acceleration)
     residual = acceleration - solution @ system
     variance = float(residual @ residual) / (number - unknowns)
-    parts = solution[:-2].reshape(-1, 4)
-    spread = np.diag(inverse)[:-2].reshape(-1, 4)[:, :2].max(axis=1)
+    own = 4 * len(orders)
+    parts, others = solution[:own].reshape(-1, 4), solution[own:-2].reshape(-1, 2)
+    spread = np.diag(inverse)[:own].reshape(-1, 4)[:, :2].max(axis=1)
     return OrderFit(parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3],
-               np.sqrt(variance * spread), residual, once)
+                    np.sqrt(variance * spread), residual, once, others[:, 0] + 1j * others[:, 1],
+                    inflation)
 
 
 def deviations(found: OrderFit, orders: Sequence[int], *, speed: float) -> FloatArray:
@@ -302,7 +321,8 @@ def deviations(found: OrderFit, orders: Sequence[int], *, speed: float) -> Float
     against = np.stack([found.residual * (back if each == 1 else back**each) for each in orders])
     blocks = np.add.reduceat(against, edges[:-1], axis=1) * (2.0 / np.diff(edges))
     batch = np.sqrt(np.sum(np.abs(blocks) ** 2, axis=1) / (2.0 * _FREE_BLOCKS * _BLOCKS))
-    batch = np.maximum(batch / (order * speed) ** 2, _LEAST_OF_WHITE * found.white[:len(order)])
+    batch = np.maximum(found.inflation * batch / (order * speed) ** 2,
+                       _LEAST_OF_WHITE * found.white[:len(order)])
     size = np.maximum(np.abs(found.vectors[:len(order)]), np.finfo(float).tiny)
     return np.asarray(np.hypot(batch, np.abs(found.change[:len(order)]) ** 2 / (4.0 * size)))
 
@@ -313,19 +333,22 @@ def block_edges(number: int) -> IntArray:
 
 
 def _system(
-    turning: Turning, orders: Sequence[int],
+    turning: Turning, orders: Sequence[int], beside: Sequence[Turning],
 ) -> tuple[ComplexArray, npt.NDArray[np.float64]]:
-    """Return exp(i theta), (n,), and the columns that a fit needs, as rows: (4 k + 2, n)."""
+    """Return exp(i theta), (n,), and the columns that a fit needs, as rows: (unknowns, n)."""
     time, number = turning.time, len(turning.time)
     reach = max(float(np.ptp(time)) / 2.0, np.finfo(float).tiny)
     along = (time - turning.middle) / reach
     once, square = np.exp(1j * turning.angle), turning.speed**2
-    system = np.empty((4 * len(orders) + 2, number))
+    system = np.empty((4 * len(orders) + 2 * len(beside) + 2, number))
     for row, order in enumerate(orders):
         turned = once if order == 1 else once**order
         value = (1j * order * turning.rate - order**2 * square) * turned
         change = value * along + (2j * order / reach) * turning.speed * turned
         system[4 * row], system[4 * row + 1] = value.real, -value.imag
         system[4 * row + 2], system[4 * row + 3] = change.real, -change.imag
+    for row, other in enumerate(beside, start=2 * len(orders)):
+        value = (1j * other.rate - other.speed**2) * np.exp(1j * other.angle)
+        system[2 * row], system[2 * row + 1] = value.real, -value.imag
     system[-2], system[-1] = along, 1.0
     return once, system

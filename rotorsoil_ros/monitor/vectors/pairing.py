@@ -1,7 +1,7 @@
 """To which speed does a measured vector belong? Amplitudes, phases and speeds find each other."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 from typing import TypeAlias
@@ -16,6 +16,7 @@ from rotorsoil_ros.monitor.vectors.history import History
 MOST_UNMATCHED = 1024  # vectors that wait; what waits longer is given up
 LARGEST_MOTION = 1e3  # [m, rad]; no machine moves further
 PATIENCE = 2  # ticks after which an amplitude goes without its phase
+MORE_PATIENCE = 5  # and a vector without the speeds of machines beside its own
 
 # A slow-roll vector is the mean of what was measured within this share of its speed.
 SLOW_ROLL_WINDOW = 0.05
@@ -40,6 +41,9 @@ class Vectors:
         Standard error of the amplitude [m, rad], 0 where it is not known.
     speed : float
         Told nearest to the stamp [rad/s]; NaN while it is not known.
+    beside : (m,) float array or None
+        Amplitude of what m other machines do, NaN where it is in the vector [m]; None of vectors
+        that were not found in samples, over turns that are known.
 
     """
 
@@ -51,6 +55,7 @@ class Vectors:
     velocity_phase: FloatArray | None = None
     deviation: FloatArray = field(default_factory=lambda: np.zeros(0))
     speed: float = math.nan
+    beside: FloatArray | None = None
     ticks: int = field(default=0, compare=False)
 
     def __post_init__(self) -> None:
@@ -85,10 +90,17 @@ class Pairing:
 
     What is measured may arrive before its speed: it waits until a later speed is known, or
     until the next tick.
+
+    Attributes
+    ----------
+    until : callable or None
+        Returns up to which stamp all speeds are known that matter besides [ns].
+
     """
 
     def __init__(self, history: History, *, tolerance_s: float) -> None:
         self._history = history
+        self.until: Callable[[], int] | None = None
         self._tolerance_ns = tolerance_s * NANOSECONDS
         self._halves: dict[tuple[int, Names], Vectors] = {}
         self._waiting: deque[Vectors] = deque()
@@ -118,7 +130,7 @@ class Pairing:
         for row, stamp in enumerate(found.stamp_ns.tolist()):
             self._wait(Vectors(
                 stamp, (found.channel,), found.amplitude[row, :1], found.phase[row, :1], nothing,
-                nothing, found.deviation[row:row + 1]))
+                nothing, found.deviation[row:row + 1], beside=found.beside[row]))
 
     def tick(self) -> None:
         """Let amplitudes go whose phases do not come."""
@@ -134,12 +146,13 @@ class Pairing:
         The speed of a vector near which none was told is NaN.
         """
         history, tolerance_ns = self._history, self._tolerance_ns
+        until = history.last_ns if self.until is None else self.until()
         for _ in range(len(self._waiting)):
             vectors = self._waiting.popleft()
             ahead = vectors.stamp_ns - history.last_ns
             vectors.ticks += is_tick
-            if ahead > 0 and not (is_tick and ahead <= tolerance_ns) and (
-                    vectors.ticks < PATIENCE):
+            if (vectors.ticks < PATIENCE and not (is_tick and ahead <= tolerance_ns)
+                    if ahead > 0 else vectors.ticks < MORE_PATIENCE and vectors.stamp_ns > until):
                 self._waiting.append(vectors)
                 continue
             vectors.speed = history.speed_near(vectors.stamp_ns, tolerance_ns=tolerance_ns)

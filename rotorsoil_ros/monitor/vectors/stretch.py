@@ -1,6 +1,6 @@
 """What is in one stretch of raw samples: a vector, or the reason why it may not be one."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
 
@@ -70,6 +70,8 @@ class Stretch:
         What is known of the sensor.
     above_noise : float
         Multiple of its standard error below which a vector is noise.
+    beside : sequence of SpeedTrack
+        Other machines whose parts turn so much faster or slower that the samples tell them.
 
     """
 
@@ -80,6 +82,7 @@ class Stretch:
     turns: float
     pickup: Pickup
     above_noise: float = ABOVE_NOISE
+    beside: Sequence[SpeedTrack] = ()
 
 
 class Finding:
@@ -142,12 +145,12 @@ class Finding:
     ) -> OrderVector | Refusal:
         """Return the vector that the samples give at a rate of new values [1/s]."""
         orders = [order for order in FITTED if order * self._turn_rate <= _FITTED_BELOW * rate]
-        found = fit(self._at, self._values, orders)
+        found = self._fit(self._at, orders)
         if (out := left_spikes(found.residual, deviation=deviation)).any():
             self._drop(out)
             if self._spikes > self._most:
                 return Refusal(Flaw.SPIKES, f'{self._spikes} spikes in a stretch')
-            found = fit(self._at, self._values, orders)
+            found = self._fit(self._at, orders)
         middle = self._at.middle
         speed = float(np.interp(middle, self._track.time, self._track.speed))
         scatter = 0.0 if taken.is_even else self._scatter(found, taken, speed, orders)
@@ -166,7 +169,12 @@ class Finding:
                    for order in TOLD]
         errors = [error[orders.index(order)] if order in told else math.nan for order in TOLD]
         return OrderVector(middle, speed, np.array(vectors, dtype=complex), np.array(errors),
-                           self._track.has_phase)
+                           self._track.has_phase, np.abs(found.beside))
+
+    def _fit(self, at: Turning, orders: list[int]) -> OrderFit:
+        """Fit what the rotor does and what others do, wherever it was."""
+        return fit(at, self._values, orders, [Turning.of(np.clip(
+            at.time, track.time[0], track.time[-1]), track) for track in self._stretch.beside])
 
     def _told(self, rate: float) -> set[int]:
         """Return which orders can be told, and take down why others cannot."""
@@ -203,7 +211,7 @@ class Finding:
     ) -> Iterator[tuple[float, float]]:
         """Yield by how much likelier each even grid is than the stamps, and how far apart."""
         for grid in self._grids(taken):
-            even = fit(Turning.of(grid, self._track), self._values, orders)
+            even = self._fit(Turning.of(grid, self._track), orders)
             likelihood = len(grid) * math.log(max(found.power, _TINY) / max(even.power, _TINY))
             yield likelihood, phase_scatter(self._at.time, grid, speed=speed)
 

@@ -1,0 +1,1 @@
+"""Machines on the same blocks: what of a measured vector is theirs."""
