@@ -69,7 +69,7 @@ def rigid(elements):
 
 
 def modes(elements):
-    """Return frequencies [Hz], shapes of unit mass (d, m) and the residual of the first count."""
+    """Return elastic frequencies [Hz] and shapes of unit mass, (d, m)."""
     from scipy.linalg import eigh
 
     stiffness, mass = matrices(elements)

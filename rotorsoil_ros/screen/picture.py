@@ -68,11 +68,11 @@ class Picture:
         self._scale = float(scale[-1])
         turn = self._turns(stamp_ns, speed)
         moved = np.real(np.einsum('nsc,ns->nc', parts, np.exp(1j * turn))) * scale[:, None]
-        offsets = [line.offsets(moved) for line in scene.lines]
+        offsets = [line.offsets(moved) for line in scene.moving]
         self._draw_shafts(stamp_ns, offsets, known)
         if len(self._sources) == 1:
             self._send_strips('orbits', stamp_ns, [
-                line.orbits(parts[:, 0], scale) for line in scene.lines], known)
+                line.orbits(parts[:, 0], scale) for line in scene.moving], known)
         for block in scene.blocks:
             self._move(block, stamp_ns, moved[:, list(block.channels)])
         for lattice in scene.lattices:
@@ -113,7 +113,7 @@ class Picture:
     def _draw_shafts(
         self, stamp_ns: IntArray, offsets: Sequence[FloatArray], known: BoolArray,
     ) -> None:
-        drawn = list(zip(self._scene.lines, offsets, strict=True))
+        drawn = list(zip(self._scene.moving, offsets, strict=True))
         self._send_strips('shaft', stamp_ns, [
             line.shaft(own)[:, None] for line, own in drawn], known)
         self._send_strips('discs', stamp_ns, [line.discs(own) for line, own in drawn], known)

@@ -167,11 +167,19 @@ class Line:
 
 
 class Scene:
-    """The machines of a case as lines and boxes; z up, contacts at zero."""
+    """
+    The machines of a case as lines and boxes; z up, contacts at zero.
 
-    def __init__(self, case: Case, channels: Sequence[Channel]) -> None:
+    The first shaft moves, or the `whole` plant: ten machines that each drew ten would be a
+    hundred.
+    """
+
+    def __init__(
+        self, case: Case, channels: Sequence[Channel], *, whole: bool = False,
+    ) -> None:
         index = {name: number for number, name in enumerate(channels)}
         self.lines = [Line(name, rotor, place, index) for name, rotor, place in placed(case)]
+        self.moving = self.lines if whole else self.lines[:1]
         blocks = [(block, embedment.depth) for block, embedment in zip(
             case.foundations, case.embedments, strict=True)]
         self.blocks = [_block(block, case, index, depth) for block, depth in blocks
@@ -210,16 +218,11 @@ class Scene:
                 for number, station in enumerate(line.stations)]
         return [(line.name, line.topped(0.08 * self.extent)) for line in self.lines]
 
-    @property
-    def stations(self) -> list[Station]:
-        """Those of all shafts."""
-        return [station for line in self.lines for station in line.stations]
-
     def largest(self, size: FloatArray) -> FloatArray:
         """Return how far anything drawn moves at amplitudes (n, c), (n,) [m]; NaN: not known."""
         moves: list[FloatArray] = [
             size[:, [station.x_channel, station.z_channel]].max(axis=1)
-            for station in self.stations]
+            for line in self.moving for station in line.stations]
         for block in self.blocks:
             arm = max(block.half_length, block.half_width, block.height)
             moves += [size[:, list(block.channels[:3])].max(axis=1),

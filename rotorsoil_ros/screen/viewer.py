@@ -61,8 +61,8 @@ class RerunSink:
         self._held_ns = 0 if url else HELD_NS
         self._basis: dict[tuple[str, type], Model | Expected] = {}
         self._plants = [
-            ShownPlant(plant, tuple(among), self._shown[next(iter(among))].scene)
-            for plant, among in plants_of(machines).items()]
+            ShownPlant(plant, tuple(among), Scene(first.case, first.table.channels, whole=True))
+            for plant, among in plants_of(machines).items() for first in [*among.values()][:1]]
         self._views: dict[str, MachineView] = {}
         self._scenes: list[PlantView] = []
         self._layout = b''

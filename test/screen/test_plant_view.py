@@ -50,6 +50,17 @@ def test_every_machine_stands_at_its_place_and_heading(house):
     assert {name for name, _ in scene.names} == {'fan_1', 'fan_2', 'pump'}
 
 
+def test_neighbours_of_one_machine_rest_and_those_of_the_plant_move(house):
+    case, channels = house
+    at = channels.index('fan_2_wheel_x')
+    motion = np.zeros((1, len(channels)))
+    motion[0, at] = 1.0
+    alone, whole = Scene(case, channels), Scene(case, channels, whole=True)
+    assert [line.name for line in alone.moving] == ['fan_1']
+    assert [line.name for line in whole.moving] == [line.name for line in alone.lines]
+    assert (alone.largest(motion)[0], whole.largest(motion)[0]) == (0.0, 1.0)
+
+
 def test_a_disc_of_a_standing_machine_lies_flat(house):
     scene = Scene(*house)
     pump = next(line for line in scene.lines if line.name == 'pump')
