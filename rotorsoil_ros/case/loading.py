@@ -48,14 +48,15 @@ def cases_of(
     files: Iterable[Path], *, cache_directory: str | Path | None,
 ) -> dict[Path, config.Case]:
     """Read case files, each once; raise InputError with all that is wrong with all of them."""
-    cases, faults = dict[Path, config.Case](), []
+    cases, faults = dict[Path, config.Case](), list[str]()
     for file in dict.fromkeys(files):
         try:
             cases[file] = config.load(file, cache_directory=cache_directory)
         except InputError as error:
-            faults.append(str(error))
+            faults += str(error).splitlines()
     if faults:
-        raise InputError('\n'.join(faults))
+        # Machines of one file have its faults in common.
+        raise InputError('\n'.join(dict.fromkeys(faults)))
     return cases
 
 

@@ -10,6 +10,7 @@ import yaml
 import rotorsoil_ros as rs
 from rotorsoil_ros.case import document, models
 from rotorsoil_ros.case.config import case_of, load
+from rotorsoil_ros.case.loading import cases_of
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.case.plant.together import Plant, sources_of
 from rotorsoil_ros.channel import HOUSING
@@ -275,6 +276,16 @@ def test_what_is_wrong_with_a_plant_is_one_clear_line(settings, line):
 def test_name_of_one_of_several_belongs_to_a_file_of_several():
     assert faults(Path(f'{FAN}#fan_1')) == [
         f'{FAN}: machines: is missing, and source=fan_1 names one of them']
+
+
+def test_what_all_machines_of_a_file_stand_on_is_at_fault_once(tmp_path):
+    def wrong(content):
+        content['soil']['density'] = -5.0
+
+    path = written(tmp_path, wrong)
+    with pytest.raises(InputError) as refused:
+        cases_of([Path(f'{path}#{name}') for name in ('fan_1', 'fan_2')], cache_directory=tmp_path)
+    assert str(refused.value) == f'{path}: soil.density: must be > 0 kg/m^3 and finite, got -5'
 
 
 def test_check_of_all_machines_does_not_ask_for_one(tmp_path, capsys, cache):
