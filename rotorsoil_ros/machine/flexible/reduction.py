@@ -26,8 +26,8 @@ _FIRST_MODES = 40
 # Shares of the stiffness that make it definite, for the search of modes.
 _SHIFT = 1e-3
 
-# An elastic mode that is slower than this share of the highest is a part that hangs on nothing.
-_LOOSE = 1e-4
+# No part of a foundation swings slower than this [rad/s]: it hangs on nothing.
+_LOOSE = 0.1
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,8 @@ class FiniteElements:
         size = self.stiffness.shape[0]
         # About a little below zero, where the matrix of a free body is definite.
         shift = _SHIFT * highest**2
-        if size <= _DENSE:
+        found = self._some_modes(highest, shift) if size > _DENSE else None
+        if found is None:
             stiffness, mass = self.stiffness.toarray(), self.mass.toarray()
             # Mass on the left: motions without mass have zero there, not infinity.
             try:
@@ -167,31 +168,33 @@ class FiniteElements:
                 raise _indefinite() from error
             keep = inverse > 1.0 / (highest**2 + shift)
             found = 1.0 / inverse[keep] - shift, shapes[:, keep] / np.sqrt(inverse[keep])
-        else:
-            found = self._some_modes(highest, shift)
         order = np.argsort(found[0])
         squares = found[0][order]
         if squares.min(initial=0.0) < -shift:
             raise _indefinite()
-        if len(squares) > rigid and squares[rigid] < _LOOSE**2 * highest**2:
+        if len(squares) > rigid and squares[rigid] < _LOOSE**2:
             raise RotorSoilError(
                 f'stiffness must hold the body together, got {rigid + 1} motions or more that '
                 'nothing resists')
         return squares[rigid:], self.pick @ found[1][:, order[rigid:]]
 
-    def _some_modes(self, highest: float, shift: float) -> tuple[FloatArray, FloatArray]:
+    def _some_modes(
+        self, highest: float, shift: float,
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """Return squared frequencies and shapes up to one; None if that is half of all."""
         size, count = self.stiffness.shape[0], _FIRST_MODES
-        while True:
+        while 2 * count < size:
             try:
                 squares, shapes = scipy.sparse.linalg.eigsh(
                     self.stiffness, k=count, M=self.mass, sigma=-shift)
             except scipy.sparse.linalg.ArpackError as error:
                 raise NotSolvedError(f'modes of the foundation were not found: {error}') \
                     from error
-            if squares.max() > highest**2 or 2 * count >= size:
+            if squares.max() > highest**2:
                 keep = squares <= highest**2
                 return squares[keep], shapes[:, keep]
-            count = min(2 * count, size // 2)
+            count *= 2
+        return None
 
     def _static(self, mass: FloatArray) -> FloatArray:
         """

@@ -133,6 +133,15 @@ def test_matrices_of_no_body_are_refused(stiffness, mass, said):
         points(stiffness, mass).body(100.0, loss=0.0)
 
 
+def test_all_modes_are_kept_where_all_are_asked_for():
+    """Beyond half of them the search for some gives way to all: nothing is left to a residual."""
+    frame = frame_elements()
+    body = frame.body(1e7, loss=0.0)
+    assert len(body.stiffness) == frame.stiffness.shape[0] - 6
+    modal = (body.shapes / body.stiffness) @ body.shapes.T
+    assert np.abs(body.residual).max() < 1e-6 * np.abs(modal).max()
+
+
 def test_free_body_cannot_be_grounded():
     with pytest.raises(RotorSoilError, match='grounded must be false of a body that nothing'):
         frame_elements().grounded(300.0, loss=0.0)
