@@ -16,6 +16,7 @@ from rotorsoil_ros.figures.response import bode_axes, COLOURS, legend_below, tid
 from rotorsoil_ros.machine.peaks import resolved_speeds
 from rotorsoil_ros.monitor.comparison import Comparison
 from rotorsoil_ros.monitor.criteria import answer, Expectation
+from rotorsoil_ros.monitor.inside import is_mixed
 from rotorsoil_ros.monitor.passage import Passage, PeakPair
 from rotorsoil_ros.monitor.points import ChannelPoints
 from rotorsoil_ros.monitor.vectors.history import STEADY
@@ -295,7 +296,9 @@ def rows(comparison: Comparison) -> Iterator[tuple[str, ...]]:
     """Yield one row per measured point, in SI units; empty where there is no number."""
     parts = {} if comparison.ground is None else comparison.ground.parts
     for points in comparison.points:
-        residual = np.abs(points.measured - points.predicted)
+        # Where another machine is in a vector nobody knows what is left of this one.
+        residual = np.where(is_mixed(points.reason), np.nan,
+                            np.abs(points.measured - points.predicted))
         ground = parts.get(points.channel, np.full(len(residual), complex(math.nan, math.nan)))
         numbers = np.stack([
             points.speed, points.amplitude, points.phase, np.abs(points.predicted),
@@ -343,6 +346,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
             'channel': entry.channel, 'source': entry.source, 'speed_rad_s': entry.speed,
             'velocity_rms_m_s': entry.velocity, 'zone': entry.zone, 'support': entry.support,
             'limits_m_s': list(entry.limits), 'constant_speed': entry.is_steady,
+            **({'shares': dict(entry.shares)} if entry.shares else {}),
         } for entry in comparison.zones],
         'ground': None if comparison.ground is None else ground_document(comparison.ground),
     }

@@ -109,6 +109,18 @@ def live(log, machine, *, tick_ns):
     return monitor, collector
 
 
+@pytest.mark.parametrize('namespace', ['', '/hall_2', '/fan_house'])
+def test_the_others_are_found_beside_it(plant, tmp_path, namespace):
+    """In a hall or a plant; not what is told of a machine of the same name elsewhere."""
+    hall = Hall(plant, TIME[:600], {name: speed[:600] for name, speed in NEARLY_ALIKE.items()})
+    log = hall.write(tmp_path / 'log.mcap', {'fan_1': [X]}, namespace=namespace)
+    fan, other = (plant.machines[name].case for name in ('fan_1', 'fan_2'))
+    found = Inputs.of(log, machine='fan_1', of=fan).beside(other)
+    assert list(found.topics) == [f'{namespace}/fan_2/joint_states']
+    assert Inputs.of(hall.write(tmp_path / 'one.mcap', {'fan_1': [X]}, telling=['fan_1']),
+                     of=fan).beside(other) is None
+
+
 def test_a_predicted_log_is_compared_as_the_run_was(offline, plant, house, tmp_path):
     fan = plant.machines['fan_1']
     predict(fan, house, tmp_path / 'log.mcap')

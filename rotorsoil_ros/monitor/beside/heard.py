@@ -106,8 +106,8 @@ class HeardBeside:
             if tally.widened:
                 yield (f'{one.name} {_near(one, tally.closest)}: {tally.widened} of '
                        f'{tally.values} values hold its part, which could not be told apart, '
-                       f'predicted up to {_um(tally.most)} at {tally.where}: their bands are '
-                       'wider by it, and nothing else is held against them')
+                       f'predicted up to {_um(tally.most)} at {tally.where}: they are left out, '
+                       'or held against a band that is wider by it and against nothing else')
 
     def news(self, machine: str, now_ns: int) -> Iterator[Remark]:
         """Yield a remark for every machine that came into the vectors or is told apart again."""

@@ -59,12 +59,6 @@ class BesideRow:
     size: FloatArray
     expected: FloatArray
 
-    def is_like(self, other: 'BesideRow', asked: IntArray) -> bool:
-        """Return whether the machine and those asked for ran as fast then."""
-        before, now = self.speed[asked], other.speed[asked]
-        return (abs(self.own - other.own) <= _ONE_SPEED * other.own
-                and bool(np.all(np.abs(before - now) <= _ONE_SPEED * now)))
-
 
 class Parting:
     """
@@ -103,13 +97,20 @@ class Parting:
         asked = np.flatnonzero(np.isfinite(row.turn) & (np.abs(row.turn) > _FAINT))
         told = np.isfinite(row.vector)
         if len(asked) and told.any():
-            rows = [one for one in self._rows if one.is_like(row, asked)] + [row]
-            parts, errors = _fitted(rows, asked)
+            parts, errors = _fitted(_alike([*self._rows, row], asked), asked)
             found[np.ix_(told, asked)], spread[np.ix_(told, asked)] = parts[told], errors[told]
         if row.time - self._kept_s >= MEMORY_S / _MOST_ROWS:
             self._rows.append(row)
             self._kept_s = row.time
         return found, spread
+
+
+def _alike(rows: Sequence[BesideRow], asked: IntArray) -> list[BesideRow]:
+    """Return the rows at which the machine and those asked for ran as fast as at the last."""
+    speed = np.array([[row.own, *row.speed[asked]] for row in rows])
+    like = np.all(np.abs(speed - speed[-1]) <= _ONE_SPEED * speed[-1], axis=1)
+    return [row for row, holds in zip(rows[:-1], like.tolist(), strict=False) if holds] + [
+        rows[-1]]
 
 
 def _fitted(rows: Sequence[BesideRow], asked: IntArray) -> tuple[ComplexArray, FloatArray]:
