@@ -1,15 +1,14 @@
 """What somebody else computed or measured of the ground: a dynamic stiffness in a CSV file."""
 
 from collections.abc import Collection, Sequence
-import csv
 from dataclasses import replace
-import math
 from pathlib import Path
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.entries.cells import lines_of, numbers_below
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.branch_points import branch_points
@@ -123,15 +122,10 @@ def columns_of(
         How such columns are called.
 
     """
-    lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), start=1)
-             if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#')]
-    if not lines:
-        raise InputError(f'{path}: is empty')
-    header = [cell.strip().replace(_PLANT_HERTZ, 'hz') for cell in lines[0][1]]
+    (_, names), *lines = lines_of(path, text)
+    header = [name.replace(_PLANT_HERTZ, 'hz') for name in names]
     _require_header(path, header, entries, example)
-    numbers = np.array([[_number(path, line, name, cell) for name, cell
-                         in zip(header, _of_length(path, line, row, len(header)), strict=True)]
-                        for line, row in lines[1:]]).reshape(-1, len(header))
+    numbers = numbers_below(path, header, lines, may_be_empty={*header} - {*_FREQUENCIES})
     return dict(zip(header, numbers.T, strict=True))
 
 
@@ -150,26 +144,6 @@ def _require_header(
             raise InputError(f'{path}: column {other} is missing; {name} is there')
     if sum(name in header for name in _FREQUENCIES) != 1:
         raise InputError(f'{path}: needs one column {" or ".join(_FREQUENCIES)}')
-
-
-def _of_length(path: Path, line: int, row: list[str], count: int) -> list[str]:
-    if len(row) != count:
-        raise InputError(f'{path}: line {line}: must have {count} cells as the header has, '
-                         f'got {len(row)}')
-    return row
-
-
-def _number(path: Path, line: int, column: str, cell: str) -> float:
-    if not cell.strip() and column not in _FREQUENCIES:
-        return math.nan
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f'{path}: line {line}: {column} must be a finite number, '
-                         f'got {shown(cell.strip())}')
-    return value
 
 
 def frequencies_of(

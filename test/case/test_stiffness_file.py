@@ -118,7 +118,7 @@ def test_every_verb_answers_on_a_file_that_knows_no_rest(tmp_path, capsys):
     ('hz\n1\n200\n', 'needs the stiffness of one dof or more'),
     ('hz,zz_re,zz_im\n1,2,0\n', 'hz must be two or more rising frequencies >= 0, got [1.0]'),
     ('hz,zz_re,zz_im\n2,2,0\n1,2,0\n', 'hz must be two or more rising frequencies'),
-    ('hz,zz_re,zz_im\n1,2\n', 'line 2: must have 3 cells as the header has, got 2'),
+    ('hz,zz_re,zz_im\n1,2\n', 'line 2: must have 3 cells, got 2'),
     ('hz,zz_re,zz_im\n1,2,x\n', "line 2: zz_im must be a finite number, got 'x'"),
     ('hz,zz_re,zz_im\n1,2,nan\n', "line 2: zz_im must be a finite number, got 'nan'"),
     ('hz,zz_re,zz_im\n,2,1\n', "line 2: hz must be a finite number, got ''"),
@@ -142,6 +142,16 @@ def test_fault_is_told_in_one_line_with_file_and_place(tmp_path, text, problem):
     said = str(caught.value)
     assert said.startswith(f'{file}: {problem}')
     assert '\n' not in said
+
+
+def test_all_damaged_cells_are_told_at_once(tmp_path):
+    file = written(tmp_path / 's.csv', 'hz,zz_re,zz_im\n1,x,2\n2,1\n3,1,y\n')
+    with pytest.raises(InputError) as caught:
+        read(file, ANY)
+    assert str(caught.value).splitlines() == [
+        f"{file}: line 2: zz_re must be a finite number, got 'x'",
+        f'{file}: line 3: must have 3 cells, got 2',
+        f"{file}: line 4: zz_im must be a finite number, got 'y'"]
 
 
 def test_jump_that_would_give_energy_between_rows_is_refused_with_its_place(tmp_path):

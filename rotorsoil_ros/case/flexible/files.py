@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
+from rotorsoil_ros.case.entries.cells import at_once
 from rotorsoil_ros.case.flexible import matrices, tables, universal
 from rotorsoil_ros.case.flexible.foreign import reading, text_of
 from rotorsoil_ros.case.flexible.interface import Interface
@@ -103,11 +104,11 @@ def of_modes(
     reads: tuple[Callable[[], Any], ...] = (
         lambda: _modes(modes), lambda: _numbers(rigid, 6), lambda: _numbers(residual),
         lambda: None if dofs is None else _motions(dofs))
-    (names, frequency, shapes), table, flexibility, rows = tables.at_once(reads)
+    (names, frequency, shapes), table, flexibility, rows = at_once(reads)
     checks: tuple[Callable[[], Any], ...] = (
         lambda: tables.rigid_of(rigid, table, names),
         lambda: tables.flexibility_of(residual, flexibility, names))
-    (mass, rigid_rows), flexibility = tables.at_once(checks)
+    (mass, rigid_rows), flexibility = at_once(checks)
     own = (tables.dofs_of(modes, names, rigid_rows) if dofs is None
            else tables.dofs_among(dofs, rows, names, rigid_rows))
     each, rest = loss.of(len(frequency))
@@ -128,7 +129,7 @@ def of_matrices(
     """Return the body of matrices with its modes up to a frequency [rad/s]."""
     reads: tuple[Callable[[], Any], ...] = (
         lambda: matrices.read(stiffness), lambda: matrices.read(mass), lambda: _motions(dofs))
-    elastic, carried, rows = tables.at_once(reads)
+    elastic, carried, rows = at_once(reads)
     order = None
     if stiffness.suffix.lower() == matrices.STIFFNESS:
         order = matrices.order_of_calculix(

@@ -10,7 +10,8 @@ import numpy as np
 import scipy.sparse
 
 from rotorsoil_ros.arrays import FloatArray
-from rotorsoil_ros.case.flexible.tables import at_once, Row
+from rotorsoil_ros.case.entries.cells import at_once
+from rotorsoil_ros.case.flexible.tables import Row
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof

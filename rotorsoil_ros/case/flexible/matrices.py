@@ -10,8 +10,8 @@ import scipy.sparse
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.entries.cells import at_once, number, whole
 from rotorsoil_ros.case.flexible.foreign import begins, content_of, reading
-from rotorsoil_ros.case.flexible.tables import at_once, number, whole
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.reduction import Sparse
 

@@ -1,30 +1,31 @@
 """What the CSV files of a foundation that bends say: its motions, modes and flexibility."""
 
-from collections.abc import Callable, Iterable, Sequence
-import csv
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 import math
 from pathlib import Path
 import re
-from typing import TypeVar
 
 import numpy as np
 
 from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.case.document import shown
+from rotorsoil_ros.case.entries.cells import (
+    at_once,
+    lines_of,
+    number,
+    numbers_below,
+    of_length,
+    whole,
+)
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, PROBE, SEAT
 
-Read = TypeVar('Read')
-
 # What is symmetric is so by this share of its largest entry, and places agree, as printed digits
 # do.
 _SYMMETRIC, _PRINTED = 1e-4, 1e-4
-
-# More of one kind tell nothing new.
-_MOST_FAULTS = 20
 
 INTERNAL = 'internal'
 _KINDS = (SEAT, CONTACT, PROBE, INTERNAL)
@@ -65,67 +66,11 @@ class Row:
     is_node: bool
 
 
-def at_once(builds: Iterable[Callable[[], Read]]) -> list[Read]:
-    """
-    Return what all of these read.
-
-    Raises
-    ------
-    InputError
-        With what is wrong with any of them, a line each.
-
-    """
-    found, faults = list[Read](), list[str]()
-    for build in builds:
-        try:
-            found.append(build())
-        except InputError as error:
-            faults += str(error).splitlines()
-    if len(faults) > _MOST_FAULTS:
-        path = faults[0].partition(': ')[0]
-        faults[_MOST_FAULTS:] = [f'{path}: and {len(faults) - _MOST_FAULTS} more like these']
-    if faults:
-        raise InputError('\n'.join(faults))
-    return found
-
-
-def lines_of(path: Path, text: str) -> list[tuple[int, list[str]]]:
-    """Return the lines of a CSV file that are neither empty nor comments, by their number."""
-    found = [(number, [cell.strip() for cell in row])
-             for number, row in enumerate(csv.reader(text.splitlines()), start=1)
-             if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#')]
-    if not found:
-        raise InputError(f'{path}: is empty')
-    line, first = found[0]
-    if len(first) == 1 and ';' in first[0]:
-        raise InputError(f'{path}: line {line}: cells must be separated by commas, and decimals '
-                         f'by points, got {shown(first[0])}')
-    return found
-
-
-def number(path: Path, line: int, what: str, cell: str) -> float:
-    """Return a cell as a finite number."""
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f'{path}: line {line}: {what} must be a number, got {shown(cell)}')
-    return value
-
-
 def numbers_of(path: Path, text: str, *, columns: int | None = None) -> FloatArray:
     """Return a file of numbers only, (rows, columns)."""
     lines = lines_of(path, text)
     width = columns or len(lines[0][1])
-
-    def numbers(line: int, row: list[str]) -> list[float]:
-        if len(row) != width:
-            raise InputError(f'{path}: line {line}: must hold {width} numbers, got {len(row)}')
-        return at_once(partial(number, path, line, f'column {place}', cell)
-                       for place, cell in enumerate(row, start=1))
-
-    return np.array(at_once(partial(numbers, line, row) for line, row in lines))
+    return numbers_below(path, [f'column {place}' for place in range(1, width + 1)], lines)
 
 
 def motions(path: Path, text: str) -> list[Row]:
@@ -155,9 +100,7 @@ def motions(path: Path, text: str) -> list[Row]:
         raise InputError('\n'.join(f'{path}: line {first}: {fault}' for fault in faults))
 
     def row(line: int, cells: list[str]) -> Row | None:
-        if len(cells) != len(header):
-            raise InputError(f'{path}: line {line}: must have {len(header)} cells, '
-                             f'got {len(cells)}')
+        of_length(path, line, cells, len(header))
         return _row(path, line, dict(zip(header, cells, strict=True)))
 
     rows = at_once(partial(row, line, cells) for line, cells in lines)
@@ -226,14 +169,6 @@ def _area(path: Path, line: int, cell: str) -> float:
     return area
 
 
-def whole(path: Path, line: int, what: str, cell: str) -> int:
-    """Return a cell as a whole number from 1 on."""
-    if not (cell.isascii() and cell.isdigit() and len(cell) < 12 and int(cell) > 0):
-        raise InputError(f'{path}: line {line}: {what} must be a whole number from 1 on, '
-                         f'got {shown(cell)}')
-    return int(cell)
-
-
 def modes(path: Path, text: str) -> tuple[list[str], FloatArray, FloatArray]:
     """
     Read a table of modes.
@@ -258,16 +193,8 @@ def modes(path: Path, text: str) -> tuple[list[str], FloatArray, FloatArray]:
     if not lines or lines[0][1][0] != 'hz':
         raise InputError(f'{path}: needs a row of frequencies that begins with hz, below the '
                          'header')
-
-    def numbers(line: int, row: list[str]) -> list[float]:
-        if len(row) != len(header):
-            raise InputError(f'{path}: line {line}: must hold {len(header)} cells, got {len(row)}')
-        return at_once(partial(number, path, line, name, cell)
-                       for name, cell in zip(header[1:], row[1:], strict=True))
-
-    table = at_once(partial(numbers, line, row) for line, row in lines)
+    found = numbers_below(path, header, lines, labels=1)
     names = [row[0] for _, row in lines[1:]]
-    found = np.array(table)
     faults = [f'motion {shown(name)} stands here twice' for name in dict.fromkeys(names)
               if names.count(name) > 1]
     faults += [f'frequency of {name} must be > 0 Hz, of elastic modes only, got {hertz:g}; rigid '

@@ -129,7 +129,7 @@ def told(build):
     ('1 1 2.0\n\n1 two 3.0\n0 2 1.0\n2 2 inf\n2 2\n',
      ['line 3: column must be a whole number from 1 on, got two',
       'line 4: row must be a whole number from 1 on, got 0',
-      'line 5: value must be a number, got inf',
+      'line 5: value must be a finite number, got inf',
       'line 6: must be row, column and value, got 2 2']),
     ('1 1 2.0\n1 2 1.0\n2 1 1.0\n2 2 2.0\n',
      ['must hold one triangle of a symmetric matrix, got both']),
@@ -296,8 +296,8 @@ def test_damaged_matrix_market_is_refused_in_one_line(tmp_path, text, said):
      ['line 2: kind must be one of seat, contact, probe, internal, got chair',
       'line 3: direction must be one of x, y, z, rx, ry, rz, or xyz of a node, got up',
       'line 3: name must be small letters, digits and _, got B!',
-      'line 3: y [m] must be a number, got zero',
-      'line 4: z [m] must be a number, got inf',
+      'line 3: y [m] must be a finite number, got zero',
+      'line 4: z [m] must be a finite number, got inf',
       'line 4: node must be a whole number from 1 on, got 0',
       'line 5: must have 7 cells, got 5']),
     ('node,name,kind,x,y,direction,colour,kind\n',
@@ -314,8 +314,9 @@ def test_every_fault_of_modes_is_told(tmp_path):
     path = tmp_path / 'modes.csv'
     assert told(lambda: tables.modes(
         path, 'dof,mode_1,mode_2\nhz,12,x\na_x,1.0,nan\na_z,1.0\n')) == [
-        'line 2: mode_2 must be a number, got x', 'line 3: mode_2 must be a number, got nan',
-        'line 4: must hold 3 cells, got 2']
+        'line 2: mode_2 must be a finite number, got x',
+        'line 3: mode_2 must be a finite number, got nan',
+        'line 4: must have 3 cells, got 2']
     assert told(lambda: tables.modes(
         path, 'dof,mode_1,mode_2\nhz,0,-3\na_x,1,1\na_x,1,1\n')) == [
         'motion a_x stands here twice',
