@@ -4,10 +4,10 @@ Measure a node that watches fifty machines: how it starts, and what a message co
 Cold start: fifty cases on three kinds of soil, infinite elements, empty cache. Then as many
 machines in one node process, reliable, each at 10 Hz, against one machine at the same number of
 messages per second, and against a bare node with the same topics, in turns: latency, what was
-lost, CPU time per message, resident memory. With plants, two of the machines are those of each.
+lost, CPU time per message, resident memory. With plants, some of the machines are those of each.
 
-    python -m benchmarks.fleet [--machines N] [--plants N] [--rate HZ] [--seconds S] [--rounds N]
-                               [--no-start]
+    python -m benchmarks.fleet [--machines N] [--plants N] [--sources N] [--rate HZ] [--seconds S]
+                               [--rounds N] [--no-start]
 """
 
 import argparse
@@ -31,6 +31,7 @@ from sensor_msgs.msg import JointState
 from rotorsoil_ros.case.loading import load_all
 
 from benchmarks.node import BARE, cpu_seconds, process, resident_mib
+from benchmarks.plant import HOUSE, house_of
 
 FASTEST = 700.0  # rad/s, of a machine of its own
 OF_PLANT = 0.2  # of that speed; those of the shipped plant turn slower
@@ -154,13 +155,13 @@ def ours(names: list[str], directory: Path) -> list[str]:
                '-p', f'machines:=[{",".join(entries)}]', '-p', 'speed_reliability:=reliable',
                '-p', 'speed_depth:=100', '-p', f'cache:={directory / "cache"}']
     for entry in entries:
-        command += ['-p', f'{entry}.case:={CASE if entry in names else "fan_house"}']
+        command += ['-p', f'{entry}.case:={CASE if entry in names else directory / HOUSE.name}']
     return command
 
 
-def names_of(machines: int, plants: int) -> list[str]:
+def names_of(machines: int, plants: int, sources: int) -> list[str]:
     """Return how machines are called, those of plants first."""
-    among = [f'plant_{number}/fan_{one}' for number in range(plants) for one in (1, 2)]
+    among = [f'plant_{number}/fan_{one}' for number in range(plants) for one in range(sources)]
     return [*among, *(f'machine_{number}' for number in range(machines - len(among)))]
 
 
@@ -195,7 +196,8 @@ def main() -> None:
     """Measure the start, then one machine and many in turns."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--machines', type=int, default=50)
-    parser.add_argument('--plants', type=int, default=0, help='of two machines each')
+    parser.add_argument('--plants', type=int, default=0)
+    parser.add_argument('--sources', type=int, default=2, help='machines of each plant')
     parser.add_argument('--rate', type=float, default=10.0, help='of each machine [Hz]')
     parser.add_argument('--seconds', type=float, default=20.0)
     parser.add_argument('--rounds', type=int, default=2)
@@ -205,12 +207,18 @@ def main() -> None:
                       OMP_NUM_THREADS='1')
     with tempfile.TemporaryDirectory() as name, suppress(KeyboardInterrupt):
         directory = Path(name)
+        house = house_of(arguments.sources, directory).rename(directory / HOUSE.name)
+        # Nobody waits here for what is computed once.
+        load_all([Path(f'{house}#fan_{one}') for one in range(
+            arguments.sources if arguments.plants else 0)],
+            cache_directory=directory / 'cache', tell=lambda text: None)
         if arguments.start:
             start_cold(directory, arguments.machines)
         runs: dict[tuple[str, int], list[list[float]]] = {}
         for _ in range(arguments.rounds):
-            for machines in (1, arguments.machines):
-                names = names_of(machines, 0 if machines == 1 else arguments.plants)
+            for machines in dict.fromkeys((1, arguments.machines)):
+                names = names_of(machines, 0 if machines == 1 else arguments.plants,
+                                 arguments.sources)
                 for node in (bare, ours):
                     runs.setdefault((node.__name__, machines), []).append(measure(
                         node(names, directory), names,

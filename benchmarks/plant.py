@@ -29,6 +29,8 @@ def house_of(count: int, directory: Path) -> Path:
     } for number in range(count)]
     path = directory / f'house_{count}.yaml'
     path.write_text(yaml.safe_dump(content), encoding='utf-8')
+    (directory / 'plant_fan.yaml').write_text(
+        (HOUSE.parent / 'plant_fan.yaml').read_text(encoding='utf-8'), encoding='utf-8')
     return path
 
 
@@ -36,8 +38,6 @@ def main() -> None:
     """Print, for some numbers of machines, what each source takes."""
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
-        (directory / 'plant_fan.yaml').write_text(
-            (HOUSE.parent / 'plant_fan.yaml').read_text(encoding='utf-8'), encoding='utf-8')
         for count in MACHINES:
             plant = Plant.load(house_of(count, directory), cache_directory=directory / 'cache')
             start = time.process_time()

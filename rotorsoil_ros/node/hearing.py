@@ -13,6 +13,7 @@ from rotorsoil_ros.wire.speeds import SpeedSource
 
 # Subscribes, given name below the machine's, full topic, type, its definition, and what tells it.
 Subscribe = Callable[[str, str, str, str, SpeedSource], None]
+MOST_PLACES = 12
 UNITS_SAID = {'rad_s': 'rad/s', 'rpm': 'rpm', 'hz': 'Hz', 'deg_s': 'deg/s'}
 
 
@@ -127,6 +128,8 @@ def _gear(ratio: float) -> str:
 def greeting(hearing: Hearing, channels: Any, speed_range_rpm: tuple[float, float]) -> str:
     """Say what a machine hears and what it answers."""
     places = list(dict.fromkeys(channel.place for channel in channels))
+    if len(places) > MOST_PLACES:  # a plant has those of all its machines
+        places[MOST_PLACES:] = [f'{len(places) - MOST_PLACES} more']
     lowest, highest = speed_range_rpm
     return (f'hears {hearing}; answers {len(channels)} channels of {", ".join(places)} '
             f'from {lowest:.0f} to {highest:.0f} rpm')
