@@ -180,7 +180,7 @@ def test_the_shipped_parameters_run_as_shipped(namespace, tmp_path):
          '-p', f'cache:={tmp_path}', *namespace],
         capture_output=True, text=True, timeout=DEADLINE_S)
     assert done.returncode == 0, done.stderr
-    assert "['fan', 'pump'] /" in done.stdout
+    assert "['fan', 'pump', 'fan_house'] /" in done.stdout
 
 
 def test_a_node_that_cannot_start_says_so_by_an_input_error(bench):
