@@ -167,6 +167,11 @@ class Teller:
                          suspected or 'what is measured looks like what it is')
         for channel, state in self._account.zones.measured.items():
             before = self._zones.get(channel)
+            if state.zone is None and before is not None:
+                del self._zones[channel]
+                yield Remark(self._machine, now_ns, Level.WARN,
+                             f'{channel}: no zone (was {before}), {MM * state.velocity:.2f} mm/s '
+                             f'rms{shared(state.shares)}')
             if state.zone is not None and state.zone != before:
                 self._zones[channel] = state.zone
                 came = f' (was {before})' if before else ''
@@ -189,6 +194,7 @@ class Teller:
             elif missing := {name for state in states.values()
                              for name, share in state.shares.items() if math.isnan(share)}:
                 said.append(f'{source} no zone: nothing is known of {", ".join(sorted(missing))}')
+                level = Level.WARN
         if found := worst_state(zones.measured):
             level = _level(found[1], is_steady)
             if level is not LEVELS[found[1].zone or 'A']:

@@ -13,6 +13,7 @@ from rotorsoil_ros.bags.predict import predict
 from rotorsoil_ros.case.plant.together import Plant
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.compared import Reason
+from rotorsoil_ros.events import Diagnostics, Level, Remark, Zoned
 from rotorsoil_ros.monitor.criteria import criteria
 from rotorsoil_ros.monitor.identification.case import identify_case, Wanted
 from rotorsoil_ros.monitor.monitor import Monitor
@@ -76,7 +77,7 @@ def test_zones_are_of_the_total_and_tell_whose_it_is(offline, plant):
 
 @pytest.mark.parametrize('tick_ns', [1, 370_000_000])
 def test_live_and_compare_find_the_same(offline, plant, house, tick_ns):
-    monitor, collector = live(house, plant.machines['fan_1'], tick_ns=tick_ns)
+    monitor, collector, _ = live(house, plant.machines['fan_1'], tick_ns=tick_ns)
     assert monitor.judge.account.inside == offline.account.inside
     assert monitor.judge.account.failures() == offline.failures
     assert sorted(monitor.judge.account.worst_zones, key=str) == sorted(offline.zones, key=str)
@@ -89,8 +90,9 @@ def test_live_and_compare_find_the_same(offline, plant, house, tick_ns):
 
 def live(log, machine, *, tick_ns):
     """Hand a log to two monitors message by message, as a graph does; tick at any phase."""
-    inputs, collector = Inputs.of(log, machine='fan_1'), Collector()
-    monitor = Monitor('fan_1', machine.table, machine.case.unbalance, sinks=[collector],
+    inputs, collector, events = Inputs.of(log, machine='fan_1'), Collector(), []
+    monitor = Monitor('fan_1', machine.table, machine.case.unbalance,
+                      sinks=[collector, events.append],
                       judging=Judging.of(machine.case))
     monitor.judge.take_criteria(criteria(
         machine.case, machine.model, machine.case.unbalance, machine.directory))
@@ -106,7 +108,7 @@ def live(log, machine, *, tick_ns):
         inlets[source.topic]([at_ns], [bytes(payload)])
     monitor.tick(due_ns, stale_after_s=3.0)
     monitor.finish(due_ns)
-    return monitor, collector
+    return monitor, collector, events
 
 
 @pytest.mark.parametrize('namespace', ['', '/hall_2', '/fan_house'])
@@ -187,3 +189,11 @@ def test_of_a_machine_that_falls_silent_the_total_is_a_lower_bound(plant, tmp_pa
     [measured] = [entry for entry in found.zones if entry.source == 'measured']
     assert (measured.zone, measured.limits[0] > measured.velocity) == ('', True)
     assert any('no zone measured: at least' in remark for remark in found.remarks)
+    _, _, events = live(log, plant.machines['fan_1'], tick_ns=1)
+    zoned = [event.measured for event in events if isinstance(event, Zoned)]
+    assert {X: 'A'} in zoned
+    assert zoned[-1] == {}
+    assert any('no zone (was A)' in event.text for event in events if isinstance(event, Remark))
+    told = [part for event in events if isinstance(event, Diagnostics) for part in event.parts]
+    assert told[-1].level is Level.WARN
+    assert 'nothing is known of fan_2' in told[-1].summary
