@@ -53,7 +53,8 @@ class Hall:
         machine = self.plant.machines[name]
         column = machine.table.channels.index(channel)
         found = machine.table.predictor(machine.case.unbalance).answer(self.speed[name])
-        return self.factor[name] * found.displacement[:, column]
+        turns = self.speed[name] > 0.0
+        return self.factor[name] * np.where(turns, found.displacement[:, column], 0.0)
 
     def acceleration(self, channel):
         """Return what a sensor feels in a channel [m/s^2]."""

@@ -58,8 +58,10 @@ class HousingZone:
     @property
     def badness(self) -> tuple[bool, float]:
         """By what zones are compared: those at constant speed count first."""
+        # What is known in part may be as bad as where zone C begins.
+        least = self.velocity if self.zone else max(self.velocity, self.limits[1])
         # That of displacement falls with speed: at standstill there is none.
-        return self.is_steady, self.velocity / (self.limits[2] or math.inf)
+        return self.is_steady, least / (self.limits[2] or math.inf)
 
 
 @dataclass(slots=True)

@@ -182,8 +182,10 @@ def test_machines_at_one_speed_are_held_against_what_both_may_do(plant, tmp_path
 
 
 def test_of_a_machine_that_falls_silent_the_total_is_a_lower_bound(plant, tmp_path):
-    hall = Hall(plant, TIME[:4500], {name: speed[:4500] for name, speed in NEARLY_ALIKE.items()})
-    log = hall.write(tmp_path / 'log.mcap', {'fan_1': [X]}, until_s={'fan_2': 6.0})
+    speed = {name: speed[:4500] for name, speed in NEARLY_ALIKE.items()}
+    speed['fan_2'] = np.where(TIME[:4500] < 8.0, speed['fan_2'], 0.0)  # and comes to rest
+    log = Hall(plant, TIME[:4500], speed, factor={'fan_2': 3.0}).write(
+        tmp_path / 'log.mcap', {'fan_1': [X]}, until_s={'fan_2': 6.0})
     found = compare_quickly(log, plant.machines['fan_1'])
     assert any('its speed is not known beside' in remark for remark in found.remarks)
     [measured] = [entry for entry in found.zones if entry.source == 'measured']
