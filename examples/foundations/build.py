@@ -41,8 +41,8 @@ def raft() -> FlexibleBody:
         for row, own in enumerate(dofs):
             axis[own] = row % 3
     places = basis.doflocs.T
-    known = [(index, Dof('node', AXES[axis[index]], 'probe', tuple(places[index])))
-             for index in range(basis.N)]
+    known = {index: Dof('node', AXES[axis[index]], 'probe', tuple(places[index]))
+             for index in range(basis.N)}
     dofs, picks = [], []
 
     def ask(station: str, kind: str, place: tuple[float, ...], area: float,
