@@ -37,6 +37,9 @@ _PERSISTS = 0.1
 # Where in the half bandwidth of a vibration a rough fit is corrected.
 _BANDWIDTH = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
+# Share of the function that guesses may neglect.
+_ROUGH = 1e-4
+
 # Entries that stay below this share of their diagonal are round-off.
 _UNCOUPLED = 1e-10
 
@@ -211,9 +214,10 @@ class Continuation:
 
     def persists(self, omega: ComplexArray) -> BoolArray:
         """
-        Return whether another range says the same of what lies far above the real axis.
+        Return whether other fits say the same of what lies far above the real axis.
 
-        There a fit may say what belongs to the range of its samples and not to the function.
+        There a fit may say what belongs to the range of its samples, or to its order, and not to
+        the function: a fit to another range has to agree, and the `rough` one.
         """
         values = self._fitted(self.parts, omega)
         told: BoolArray = np.ones(omega.shape, dtype=bool)
@@ -224,11 +228,14 @@ class Continuation:
             if not here.any():
                 continue
             gap = values[here] - self._fitted(self._other_ranges[parts], omega[here])
+            if self.rough is not self:
+                fewer = self._fitted(self.rough.parts, omega[here]) - values[here]
+                told[here] = _largest(fewer) <= _PERSISTS * _largest(values[here])
             if self.known is not None:
                 real = omega[here].real.astype(complex)
                 gap -= self._fitted(self.parts, real) - self._fitted(
                     self._other_ranges[parts], real)
-            told[here] = _largest(gap) <= _PERSISTS * _largest(values[here])
+            told[here] &= _largest(gap) <= _PERSISTS * _largest(values[here])
         return told
 
     @cached_property
@@ -248,6 +255,28 @@ class Continuation:
         for index, part in parts:
             values[..., index[:, None], index] = part(omega)
         return values
+
+    @cached_property
+    def rough(self) -> 'Continuation':
+        """
+        The same by as few poles as guesses need, if that fit is one to be continued.
+
+        Near a branch point, which crowds poles, none are left out, nor of a law that is given.
+        """
+        if self.known is not None or self.law is not None or np.isfinite(self.within).any():
+            return self
+        omega, values = self.samples
+        few = tuple((index, RationalMatrix.roughly(
+            omega, values[:, index[:, None], index], _ROUGH)) for index, _ in self.parts)
+        fewer = sum(len(part.nodes) for _, part in few) < sum(
+            len(part.nodes) for _, part in self.parts if isinstance(part, RationalMatrix))
+        return replace(self, parts=few) if fewer and all(
+            part.continues(omega, self.within, is_exact=True) for _, part in few) else self
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether a guess by `rough` may be far off where a vibration decays fast."""
+        return self.known is not None or self.rough is not self
 
     def states(self, tolerance: float) -> States:
         """Return the function over its size by its poles, small terms left out."""

@@ -35,6 +35,9 @@ _NEAR = 3.0
 _BOUND = 1e3
 _LOW_PEAK = 0.1
 
+# A pole of less real part, as a share of itself, is at a negative frequency: what creeps is not.
+_CREEPING = 0.2
+
 # Poles this many times higher than all samples are constants.
 _FAR = 1e6
 
@@ -129,7 +132,8 @@ class RationalMatrix:
         most = next(count for count, worst in enumerate(errors, 1) if worst <= enough)
         tried = [cls(omega[chosen[:count]], values[chosen[:count]], fits[count - 1][1])
                  for count in range(1, most + 1)]
-        if tried[-1].continues(omega, within):
+        is_exact = errors[most - 1] <= _TOLERANCE
+        if tried[-1].continues(omega, within, is_exact=is_exact):
             return tried[-1]
         # The table follows no law that could be continued: noise, or too few points. The best
         # one that may, if only a constant, leaves the rest to what is known at real frequencies.
@@ -137,7 +141,20 @@ class RationalMatrix:
                  if fit.continues(omega, within)]
         return min(sound, key=lambda pair: pair[0])[1]
 
-    def continues(self, omega: FloatArray, within: tuple[float, float]) -> bool:
+    @classmethod
+    def roughly(
+        cls, omega: FloatArray, values: ComplexArray, tolerance: float,
+    ) -> 'RationalMatrix':
+        """Fit samples (n, d, d) by as few nodes as an error of all of them allows."""
+        entries = values.reshape(len(omega), -1)
+        chosen, fits = _greedy(omega, entries, np.ones(entries.shape),
+                               min(_MOST_NODES, len(omega) // 2),
+                               lambda errors: bool(errors) and errors[-1] <= tolerance)
+        return cls(omega[chosen], values[chosen], fits[-1][1])
+
+    def continues(
+        self, omega: FloatArray, within: tuple[float, float], *, is_exact: bool = False,
+    ) -> bool:
         """
         Return whether the fit may stand for a passive support at complex frequencies.
 
@@ -145,17 +162,23 @@ class RationalMatrix:
         has, or low and narrow peaks anywhere; those of a polynomial, as a spline through few
         points is one, leave no bound at infinity. Each is a fit to the samples alone. Only what
         vibrates within two frequencies counts: hysteretic damping, which turns its sign with the
-        frequency, has a growing mirror image of every sharp pole at negative ones.
+        frequency, has a growing mirror image of every sharp pole at negative ones. A fit that
+        `is_exact` follows no noise: it may have such images too, and peaks beyond its samples,
+        as ground with delays between its patches has.
         """
         if not np.all(np.isfinite(self.weights)) or not self.weights.sum():
             return False
         found = self.states(_ROUGH)
         decay = found.poles.imag / omega[-1]
         narrow = np.abs(found.poles.imag) < _NARROW * np.abs(found.poles)
-        low = found.height < _LOW_PEAK * np.abs(found.poles.imag)
-        noise = (decay < -_ON_AXIS) | (narrow & low)
+        low = narrow & (found.height < _LOW_PEAK * np.abs(found.poles.imag))
+        if is_exact:
+            low &= found.poles.real < omega[-1]
+        noise = (decay < -_ON_AXIS) | low
         noise &= (found.poles.real > within[0]) & (found.poles.real < within[1])
         noise &= np.abs(found.poles) < _NEAR * omega[-1]
+        if is_exact:
+            noise &= found.poles.real > -_CREEPING * np.abs(found.poles)
         return not noise.any() and bool(np.abs(found.constant).max(initial=0.0) < _BOUND)
 
     def __call__(self, omega: ComplexArray) -> ComplexArray:

@@ -27,6 +27,9 @@ _MOST_SLOW = 24
 # A rotor that moves so much less than its blocks stays still.
 _STILL = 1e-9
 
+# Cosine from which a vibration is surely the one that was followed, as no two of them can be.
+_SURELY = 0.9
+
 # A critical speed is found to this share of itself, or what round-off leaves after so many steps.
 _FOUND = 1e-12
 _STEPS = 40
@@ -207,8 +210,8 @@ def _torn(speed: FloatArray, found: Spectrum, branch: IntArray) -> FloatArray:
 
 def _crossings(
     speed: FloatArray, found: Spectrum, branch: IntArray,
-) -> tuple[FloatArray, FloatArray, ComplexArray]:
-    """Return speeds (c, 2), omega - Omega (c, 2) and shapes (c, 2, d) around each crossing."""
+) -> tuple[FloatArray, ComplexArray, ComplexArray]:
+    """Return speeds (c, 2), frequencies (c, 2) and shapes (c, 2, d) around each crossing."""
     rows, modes = [], []
     for name in range(branch.max(initial=-1) + 1):
         row, mode = np.nonzero(branch == name)
@@ -217,25 +220,26 @@ def _crossings(
             rows.append(row[i:i + 2])
             modes.append(mode[i:i + 2])
     at, which = (np.array(pairs, dtype=int).reshape(-1, 2) for pairs in (rows, modes))
-    return speed[at], found.frequency[at, which].real - speed[at], found.shape[at, which]
+    return speed[at], found.frequency[at, which], found.shape[at, which]
 
 
 def _close(
-    solver: SpectrumSolver, ends: FloatArray, excess: FloatArray, shapes: ComplexArray,
+    solver: SpectrumSolver, ends: FloatArray, frequency: ComplexArray, shapes: ComplexArray,
 ) -> list[CriticalSpeed]:
     """Close all brackets at once by the false position, in its Illinois variant."""
     if not len(ends):
         return []
     wanted, last = unit_shapes(shapes).conj().transpose(0, 2, 1), np.full(len(ends), -1)
+    edges, excess = ends.copy(), frequency.real - ends
     closed: dict[int, CriticalSpeed] = {}
     still = np.arange(len(ends))
     for step in range(_STEPS):
         low, high = ends[still].T
         before, after = excess[still].T
         speed = (low * after - high * before) / (after - before)
-        found = solver.solve(speed, _ALL)
-        # Of all modes at a speed the one most like those at both ends.
-        mode = np.nansum(np.abs(unit_shapes(found.shape) @ wanted[still]), axis=2).argmax(axis=1)
+        share = (speed - edges[still, 0]) / (edges[still, 1] - edges[still, 0])
+        between = (1.0 - share) * frequency[still, 0] + share * frequency[still, 1]
+        found, mode = _most_like(solver, speed, between, wanted[still])
         height = found.frequency[np.arange(len(still)), mode].real - speed
         # A bracket that has shrunk to a jump from one mode to another holds no crossing to find.
         done = ((np.abs(height) <= _FOUND * speed) | (np.abs(high - low) <= _FOUND * speed)
@@ -250,6 +254,19 @@ def _close(
         if not len(still):
             break
     return [closed[row] for row in sorted(closed)]
+
+
+def _most_like(
+    solver: SpectrumSolver, speed: FloatArray, near: ComplexArray, wanted: ComplexArray,
+) -> tuple[Spectrum, IntArray]:
+    """Return vibrations at speeds (n,), and which of them are most like shapes (n, d, 2)."""
+    found, sound = solver.nearest(speed, near)
+    alike = np.abs(unit_shapes(found.shape) @ wanted)[:, 0].max(axis=1)
+    if np.all(sound & (alike > _SURELY)):
+        return found, np.zeros(len(speed), dtype=int)
+    found = solver.solve(speed, _ALL)
+    # Of all modes at a speed the one most like those at both ends.
+    return found, np.nansum(np.abs(unit_shapes(found.shape) @ wanted), axis=2).argmax(axis=1)
 
 
 def _critical(

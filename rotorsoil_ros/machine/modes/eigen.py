@@ -7,12 +7,9 @@ import numpy as np
 
 from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.continuation import Continuation
-from rotorsoil_ros.machine.modes.elastic import Elastic
+from rotorsoil_ros.machine.modes.below import Elastic, SupportModes
+from rotorsoil_ros.machine.modes.guesses import CREEPING, Guesses, vibrates
 from rotorsoil_ros.rotor.whirl import ORBITS
-
-# Frequencies w = lambda / i with less real part than this share of |w| do not vibrate: they
-# creep back, and a hysteretic soil alone gives such ones a little of it.
-_CREEPING = 0.2
 
 # A vibration with less damping than this is felt: its amplification factor is above 2.5.
 FELT_BELOW = 0.2
@@ -21,17 +18,14 @@ FELT_BELOW = 0.2
 _CONVERGED = 1e-6
 _ITERATIONS = 12
 
+# Steps of inverse iteration after which what is near a frequency is all that is left.
+_INVERSE = 3
+
 # A guess that moves farther, relative to itself, was hardly one of this mode.
 _NEAR_GUESS = 0.05
 
-# Guesses this far outside the piece of their compliance may still lead into it.
-_ASIDE = 0.05
-
 # Two vectors are one from this cosine on, at frequencies equal within the steps.
 _SAME = 0.999
-
-# Share of the compliance that guesses may neglect.
-_ROUGH = 1e-4
 
 
 @dataclass(frozen=True)
@@ -65,6 +59,10 @@ class FreeVibration:
         Frequencies between which all this holds [rad/s].
     shafts : tuple of (slice, int array)
         Which of the bearings, and of the modes forward then backward, are those of each shaft.
+    below : SupportModes
+        What the support adds to guesses.
+    moves : (2 b, s) float array
+        Housing motion per all of its motions.
     slow : int
         So many motions of the rotors on their real bearings are within `reach`.
 
@@ -83,10 +81,12 @@ class FreeVibration:
     reach: float
     within: tuple[FloatArray, FloatArray]
     shafts: tuple[tuple[slice, IntArray], ...]
+    below: SupportModes
+    moves: FloatArray
     slow: int
 
     @cached_property
-    def _modes(self) -> tuple[AnyArray, ComplexArray, ComplexArray]:
+    def modes(self) -> tuple[AnyArray, ComplexArray, ComplexArray]:
         """
         Return all whirl modes, forward then backward.
 
@@ -101,25 +101,25 @@ class FreeVibration:
         return self.inverse.reshape(count, -1), orbits, driven.transpose(0, 2, 1)
 
     @cached_property
-    def _slowness(self) -> FloatArray:
+    def slowness(self) -> FloatArray:
         """How long each takes, (n, m) [s]; negative of what does not swing the right way."""
-        inverse, _, _ = self._modes
+        inverse, _, _ = self.modes
         size = np.abs(inverse)
-        return np.where(inverse.real > -_CREEPING * size, size, -size)
+        return np.where(inverse.real > -CREEPING * size, size, -size)
 
     @cached_property
     def resonant(self) -> IntArray:
         """Rotor modes that may resonate, (n, k): they are unknowns of their own."""
-        count = int((self._slowness * self.highest * self.reach > 1.0).sum(axis=1).max())
+        count = int((self.slowness * self.highest * self.reach > 1.0).sum(axis=1).max())
         # Where a bearing is softer one way than its nominal spring a forward and a backward one
         # make what is slow there.
-        count = min(count + 2 * max(self.slow - count, 0), self._slowness.shape[1])
-        return np.argsort(-self._slowness, axis=1)[:, :count]
+        count = min(count + 2 * max(self.slow - count, 0), self.slowness.shape[1])
+        return np.argsort(-self.slowness, axis=1)[:, :count]
 
-    def _pick(
+    def pick(
         self, modes: IntArray,
     ) -> tuple[AnyArray, ComplexArray, ComplexArray]:
-        inverse, orbits, driven = self._modes
+        inverse, orbits, driven = self.modes
         return (np.take_along_axis(inverse, modes, axis=1),
                 np.take_along_axis(orbits, modes[:, None], axis=2),
                 np.take_along_axis(driven, modes[:, :, None], axis=1))
@@ -127,7 +127,7 @@ class FreeVibration:
     @cached_property
     def _residues(self) -> list[ComplexArray]:
         """Of each shaft, (n, m, 4 b^2): no mode moves the journals of another."""
-        _, orbits, driven = self._modes
+        _, orbits, driven = self.modes
         found: list[ComplexArray] = []
         for seats, modes in self.shafts:
             ports = slice(2 * seats.start, 2 * seats.stop)
@@ -136,7 +136,7 @@ class FreeVibration:
             found.append(pairs.reshape(*pairs.shape[:2], -1))
         return found
 
-    def _summed(self, weights: AnyArray) -> ComplexArray:
+    def summed(self, weights: AnyArray) -> ComplexArray:
         """Return the journals' receptance by modes of weights (n, p, m), (n, p, 2 b, 2 b)."""
         total = np.zeros((*weights.shape[:2], len(self.rows), len(self.rows)), dtype=complex)
         for (seats, modes), residues in zip(self.shafts, self._residues, strict=True):
@@ -147,7 +147,7 @@ class FreeVibration:
 
     def _gains(self, frequency: ComplexArray) -> ComplexArray:
         """Return 1 / (1 - w / omega_k) of modes that cannot resonate, else 0, (n, p, m)."""
-        inverse, _, _ = self._modes
+        inverse, _, _ = self.modes
         stiffness = 1.0 - frequency[..., None] * inverse[:, None]
         np.put_along_axis(stiffness, self.resonant[:, None], np.inf, axis=2)
         return np.asarray(1.0 / stiffness)
@@ -160,11 +160,10 @@ class FreeVibration:
 
         What bends moves the housings by X f besides, f being the force through the bearings.
         """
-        _, orbits, _ = self._pick(self.resonant)
+        _, orbits, _ = self.pick(self.resonant)
         ports = len(self.rows)
         gives, bent, mass = self.elastic.follows(frequency)
-        rows, less = self.rows + bent, self._summed(
-            self._gains(frequency)) - np.eye(ports)
+        rows, less = self.rows + bent, self.summed(self._gains(frequency)) - np.eye(ports)
         gap = np.concatenate([
             -np.eye(ports) - less + less @ gives,
             np.broadcast_to(orbits[:, None], (*frequency.shape, *orbits.shape[1:])),
@@ -191,7 +190,7 @@ class FreeVibration:
             of resonant rotor modes, and the motion z of the support.
 
         """
-        inverse, orbits, driven = self._pick(self.resonant)
+        inverse, orbits, driven = self.pick(self.resonant)
         _, ports, modes = orbits.shape
         own = len(self.mass)
         w = frequency[..., None, None]
@@ -213,101 +212,9 @@ class FreeVibration:
         total[..., motion, motion] += np.eye(own) + compliance @ (self.spring - w**2 * mass)
         return total
 
-    def pencil(self) -> tuple[ComplexArray, ComplexArray]:
-        """
-        Return A and B of a linear eigenproblem A y = w B y with nearly the same eigenvalues.
-
-        Fast rotor modes answer the bearings statically and a motion of the housings with their
-        gyroscopic couple and their mass. The compliance becomes constant + left
-        (w - poles)^-1 right with its states as unknowns.
-        """
-        slow, static, first, second = self._slow
-        inverse, orbits, driven = self._pick(slow)
-        constant, linear, inertia = self.bearings
-        length, ports, modes = orbits.shape
-        limit = self.reach * self.highest
-        rows, mass, spring, gives = self.elastic.joined(
-            self.rows, self.mass, self.spring, highest=limit)
-        own, heavy = len(mass), ports if inertia.any() else 0
-        soil_states = self.compliance.states(_ROUGH).beside(
-            1.0 / self.elastic.spring[self.elastic.slow(limit)])
-        sizes = (ports, modes, own, own, len(soil_states.poles), own, ports, heavy)
-        ends = np.cumsum(sizes)
-        force, mode, motion, load, soil, rate, gap, swing = (
-            slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
-        modal = range(mode.start, mode.stop)
-        a = np.zeros((length, ends[-1], ends[-1]), dtype=complex)
-        b = np.zeros_like(a)
-        middle = 0.25 * self.highest
-        # Each block of rows in the order of the unknowns.
-        a[:, force, force] = np.eye(ports)
-        a[:, force, gap], b[:, force, gap] = np.eye(ports) - constant, linear
-        b[:, force, swing] = -middle * inertia[..., :heavy]
-        a[:, swing, swing], b[:, swing, gap] = np.eye(heavy), np.eye(heavy, ports) / middle
-        # Of what bends fast there is its static answer to the force through the bearings.
-        a[:, mode, force], a[:, modal, modal] = driven @ (np.eye(ports) - gives), 1.0
-        a[:, mode, gap], a[:, mode, motion] = -driven @ gives, -driven @ rows
-        b[:, modal, modal] = inverse
-        a[:, motion, motion], a[:, motion, load] = np.eye(own), -soil_states.constant
-        a[:, motion, soil] = -soil_states.left
-        a[:, load, force] = a[:, load, gap] = -rows.T
-        a[:, load, load], a[:, load, motion] = np.eye(own), spring
-        b[:, load, motion] = rows.T @ first @ rows
-        b[:, load, rate] = middle * (mass + rows.T @ second @ rows)
-        a[:, soil, load], a[:, soil, soil] = soil_states.right, np.diag(soil_states.poles)
-        b[:, soil, soil] = np.eye(len(soil_states.poles))
-        a[:, rate, rate], b[:, rate, motion] = np.eye(own), np.eye(own) / middle
-        less = np.eye(ports) - static
-        a[:, gap, force], a[:, gap, mode] = static + less @ gives, -orbits
-        a[:, gap, gap], a[:, gap, motion] = np.eye(ports) + less @ gives, less @ rows
-        return a, b
-
-    @cached_property
-    def _slow(self) -> tuple[IntArray, ComplexArray, ComplexArray, ComplexArray]:
-        """Modes that are slow in either sense, (n, 2 k), and what others do, (n, 2 b, 2 b)."""
-        inverse, _, _ = self._modes
-        count = self.resonant.shape[1]
-        order = np.argsort(-self._slowness, axis=1)
-        slow = np.concatenate([self.resonant, order[:, order.shape[1] - count:]], axis=1)
-        others = np.ones(inverse.shape)
-        np.put_along_axis(others, slow, 0.0, axis=1)
-        powers = others[:, None] * inverse[:, None] ** np.arange(3)[:, None]
-        moments = self._summed(powers)
-        return slow, moments[:, 0], moments[:, 1], moments[:, 2]
-
     def guesses(self, count: int) -> tuple[ComplexArray, ComplexArray]:
-        """
-        Solve the linear eigenproblem for as many modes as are wanted.
-
-        Returns
-        -------
-        frequency : (n, p) complex array
-            w of all that vibrates in range, ascending, filled up with NaN [rad/s].
-        vector : (n, p, d) complex array
-            What `matrix` sends nearly to zero.
-
-        """
-        a, b = self.pencil()
-        memory = np.flatnonzero(b.any(axis=(0, 1)))
-        # About a growing vibration: no passive machine has one, so that the inverse exists even
-        # without any mass or static stiffness.
-        centre = -0.1j * self.highest
-        spread = np.linalg.solve(a - centre * b, b[..., memory])
-        values, vectors = np.linalg.eig(spread[:, memory])
-        values = np.where(np.abs(values) * self.highest < 1e-6, 1e-6 / self.highest, values)
-        frequency = centre + 1.0 / values
-        low, high = (end[:, None] for end in self.within)
-        keep = (vibrates(frequency) & (np.abs(frequency) < 2.0 * self.highest)
-                & (frequency.real > (1.0 - _ASIDE) * low)
-                & (frequency.real < (1.0 + _ASIDE) * high))
-        count = min(int(keep.sum(axis=1).max()), count)
-        order = np.argsort(np.where(keep, frequency.real, np.inf), axis=1)[:, :count]
-        ports, modes = len(self.rows), self.resonant.shape[1]
-        motion = ports + 2 * modes
-        leading = [*range(ports + modes), *range(motion, motion + len(self.mass))]
-        full = spread[:, leading] @ np.take_along_axis(vectors, order[:, None], axis=2)
-        return (np.take_along_axis(np.where(keep, frequency, np.nan), order, axis=1),
-                full.transpose(0, 2, 1))
+        """Return frequencies (n, p) and vectors (n, p, d) that are nearly right."""
+        return Guesses(self).lowest(count)
 
     def solve(self, count: int) -> tuple[ComplexArray, ComplexArray, BoolArray, FloatArray]:
         """
@@ -332,23 +239,59 @@ class FreeVibration:
         wanted: BoolArray = exists & self.compliance.agrees(frequency)
         light = exists & ~wanted & (np.abs(frequency.imag) < FELT_BELOW * np.abs(frequency))
         untold = np.where(light, frequency.real, np.inf).min(axis=1, initial=np.inf)
+        # Those that are solved for first, in their order; no others.
+        order = np.argsort(~wanted, axis=1, kind='stable')[:, :wanted.sum(axis=1).max(initial=0)]
+        guess, frequency, wanted = (np.take_along_axis(one, order, axis=1)
+                                    for one in (guess, frequency, wanted))
+        vector = np.take_along_axis(vector, order[..., None], axis=1)
         vector[~wanted] = 1.0
+        # What a rough fit says far from the real axis may have no mode near its guess.
+        doubtful = self.compliance.is_rough & (guess.imag > FELT_BELOW * np.abs(guess))
         active: BoolArray = wanted.copy()
         for _ in range(_ITERATIONS):
             step, vector = self._newton(frequency, vector)
             frequency = frequency + np.where(wanted, step, 0.0)
             active &= np.abs(step) > _CONVERGED * np.abs(frequency)
+            active &= ~(doubtful & self._left(guess, frequency))
             if not active.any():
                 break
-        moved = wanted & (np.abs(frequency - guess) > _NEAR_GUESS * np.abs(frequency))
+        moved = wanted & self._left(guess, frequency)
         frequency = np.where(wanted & ~active & vibrates(frequency), frequency, np.nan)
-        unsound = active | moved | _repeats(frequency, vector)
-        if self.compliance.known is not None:
-            # What a rough fit says far from the real axis may have no mode near its guess.
-            heavy = unsound & (guess.imag > FELT_BELOW * np.abs(guess))
-            frequency = np.where(heavy, np.nan, frequency)
-            unsound &= ~heavy
+        # What has left its own guess does not take that of another.
+        unsound = active | moved | _repeats(np.where(moved, np.nan, frequency), vector)
+        frequency = np.where(unsound & doubtful, np.nan, frequency)
+        unsound &= ~doubtful
         return frequency, vector, np.asarray(~unsound.any(axis=1)), untold
+
+    @staticmethod
+    def _left(guess: ComplexArray, frequency: ComplexArray) -> BoolArray:
+        """Return which have moved too far to be what was guessed."""
+        return np.asarray(np.abs(frequency - guess) > _NEAR_GUESS * np.abs(frequency))
+
+    def nearest(self, frequency: ComplexArray) -> tuple[ComplexArray, ComplexArray, BoolArray]:
+        """
+        Solve for the vibrations next to frequencies (n, 1), by inverse iteration first.
+
+        Returns
+        -------
+        frequency (n, 1), vector (n, 1, d) : complex arrays
+            As `solve`.
+        sound : (n,) bool array
+            Whether each is near.
+
+        """
+        guess, near = frequency, self.matrix(frequency * (1.0 + 1e-9j))
+        vector = np.ones((*frequency.shape, near.shape[-1]), dtype=complex)
+        for _ in range(_INVERSE):
+            vector = np.linalg.solve(near, vector[..., None])[..., 0]
+            vector /= np.linalg.norm(vector, axis=-1, keepdims=True)
+        for _ in range(_ITERATIONS):
+            step, vector = self._newton(frequency, vector)
+            frequency = frequency + step
+            active = np.abs(step) > _CONVERGED * np.abs(frequency)
+            if not active.any():
+                break
+        return frequency, vector, np.asarray(~(active | self._left(guess, frequency))[:, 0])
 
     def _newton(
         self, frequency: ComplexArray, vector: ComplexArray,
@@ -372,7 +315,7 @@ class FreeVibration:
 
     def amplitudes(self, frequency: ComplexArray, vector: ComplexArray) -> ComplexArray:
         """Return the amplitudes of all rotor modes, forward then backward, (n, p, m)."""
-        _, _, driven = self._modes
+        _, _, driven = self.modes
         ports, modes = len(self.rows), self.resonant.shape[1]
         _, housing, _, _ = self._moves(frequency)
         load = (housing @ vector[..., None])[..., 0] - vector[..., :ports]
@@ -380,11 +323,6 @@ class FreeVibration:
         np.put_along_axis(forced, self.resonant[:, None],
                           vector[..., ports:ports + modes], axis=2)
         return forced
-
-
-def vibrates(frequency: ComplexArray) -> BoolArray:
-    """Return which eigenvalues vibrate at all; overdamped ones have no frequency."""
-    return np.asarray(frequency.real > _CREEPING * np.abs(frequency))
 
 
 def _repeats(frequency: ComplexArray, vector: ComplexArray) -> BoolArray:

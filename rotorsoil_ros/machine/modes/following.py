@@ -8,14 +8,12 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes.feeding import knots
+from rotorsoil_ros.machine.modes.guesses import CREEPING
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 from rotorsoil_ros.units import rad_s_to_rpm
 
 # A vibration grows if it gains more than this share of |lambda|: less is round-off.
 _ROUND_OFF = 1e-9
-
-# What does not swing, |Re w| below this share of |w|, creeps away rather than whirls.
-CREEPING = 0.2
 
 # Speeds at which the search begins, and up to how many it looks closer.
 _FIRST_SPEEDS = 17

@@ -10,14 +10,10 @@ from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.below import SupportModes
+from rotorsoil_ros.machine.modes.guesses import vibrates
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.assembly import Rotor
-
-# Poles of the soil that weigh less are noise of its fit.
-_NOISE = 1e-4
-
-# What hardly swings, |Re w| below this share of |w|, has no natural frequency.
-_CREEPING = 0.2
 
 # A mode belongs to a direction if this share of the housings' motion is in it.
 _IN_DIRECTION = 0.1
@@ -111,26 +107,10 @@ def _vibrations(
     within: tuple[float, float],
 ) -> tuple[FloatArray, ComplexArray]:
     """Return what vibrates between two frequencies, as `natural_frequencies`."""
-    unit, soil = 0.5 * span[1], compliance.states(_NOISE).beside(np.ones(support.elastic) + 0j)
-    size = np.append(compliance.size, np.ones(support.elastic))
-    rows = support.motion_rows * size
-    mass = size[:, None] * support.motion_mass * size + rows.T @ carried @ rows
-    spring = size[:, None] * support.motion_spring * size
-    own, states = len(mass), len(soil.poles)
-    # z = constant p + left xi, w xi = poles xi + right p, p = (w^2 M - K) z with w z = unit u.
-    a = np.zeros((2 * own + states,) * 2, dtype=complex)
-    b = np.zeros_like(a)
-    motion, rate, state = slice(0, own), slice(own, 2 * own), slice(2 * own, None)
-    a[motion, motion], a[motion, state] = np.eye(own) + soil.constant @ spring, -soil.left
-    b[motion, rate] = unit * soil.constant @ mass
-    a[rate, rate], b[rate, motion] = unit * np.eye(own), np.eye(own)
-    a[state, motion], a[state, state] = -soil.right @ spring, np.diag(soil.poles)
-    b[state, rate], b[state, state] = -unit * soil.right @ mass, np.eye(states)
-    frequency, vectors = scipy.linalg.eig(a, b)
-    finite = np.isfinite(frequency)
-    frequency, vectors = frequency[finite], vectors[:, finite]
-    chosen = np.flatnonzero((frequency.real > _CREEPING * np.abs(frequency))
-                            & (np.abs(frequency) <= span[1])
+    rows = support.motion_rows * np.append(compliance.size, np.ones(support.elastic))
+    modes = SupportModes.of(support, compliance, span[1], rows=rows, carried=carried)
+    frequency = modes.frequency
+    chosen = np.flatnonzero(vibrates(frequency) & (np.abs(frequency) <= span[1])
                             & (frequency.real >= within[0]) & (frequency.real <= within[1]))
     chosen = chosen[compliance.persists(frequency[chosen])]
-    return np.abs(frequency[chosen]), (rows @ vectors[motion, chosen]).T
+    return np.abs(frequency[chosen]), (rows @ modes.shape[:, chosen]).T

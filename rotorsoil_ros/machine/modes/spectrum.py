@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
 from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.below import Elastic, SupportModes
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
-from rotorsoil_ros.machine.modes.elastic import Elastic
 from rotorsoil_ros.machine.modes.shafts import MORE_SHAPES, ShaftLine, Shafts
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of
 from rotorsoil_ros.rotor.reduced import Whirls
@@ -209,12 +209,11 @@ class SpectrumSolver:
         return float((error / (energy + kinetic.sum(axis=1))).max(initial=0.0))
 
     def _solve(self, speed: FloatArray, count: int, spare: int) -> Spectrum:
-        sides = [(zone.lag, int(np.searchsorted(self.shafts.turning_points, zone.middle)))
-                 for zone in self.zones]
         whirls = {side: self.shafts.whirls(speed, zone.middle, zone.lag)
-                  for side, zone in dict(zip(sides, self.zones, strict=True)).items()}
+                  for side, zone in dict(zip(self._sides, self.zones, strict=True)).items()}
         parts, strays = zip(*(self._solve_zone(speed, whirls[side], zone, count + spare)
-                              for side, zone in zip(sides, self.zones, strict=True)), strict=True)
+                              for side, zone in zip(self._sides, self.zones, strict=True)),
+                            strict=True)
         found, astray = _merged(list(parts), count), np.concatenate(strays, axis=1)
         # What another zone tells there, as one beside it may too, is not lost.
         blur = max(zone.compliance.blur for zone in self.zones)
@@ -222,6 +221,34 @@ class SpectrumSolver:
         told = np.fmin.reduce(gap, axis=2, initial=np.inf) <= blur
         lost = np.where(told, np.inf, astray).min(axis=1, initial=np.inf)
         return replace(found, untold=np.minimum(found.untold, lost))
+
+    @property
+    def _sides(self) -> list[tuple[float, int]]:
+        """On which side of what turns with the frequency each zone is."""
+        return [(zone.lag, int(np.searchsorted(self.shafts.turning_points, zone.middle)))
+                for zone in self.zones]
+
+    def nearest(self, speed: FloatArray, frequency: ComplexArray) -> tuple[Spectrum, BoolArray]:
+        """
+        Return the vibration at each speed that is nearest to a frequency, (n,) [rad/s] each.
+
+        And whether there is one so near in the zone of the frequency.
+        """
+        parts, where, sound = list[Spectrum](), list[IntArray](), np.zeros(len(speed), dtype=bool)
+        for zone in self.zones:
+            low, high = zone.ends(zone.owned, speed)
+            rows = np.flatnonzero((frequency.real >= low) & (frequency.real < high))
+            if not len(rows):
+                continue
+            whirls = self.shafts.whirls(speed[rows], zone.middle, zone.lag)
+            vibration = self._at(speed[rows], whirls, zone, _REACHES[0])
+            found, vector, sound[rows] = vibration.nearest(frequency[rows, None])
+            parts.append(self._spectrum(vibration, whirls[1], found, vector,
+                                        np.full(len(rows), np.inf)))
+            where.append(rows)
+        order = np.argsort(np.concatenate(where))
+        return Spectrum(*(np.concatenate([getattr(part, field.name) for part in parts])[order]
+                          for field in fields(Spectrum))), sound
 
     def _solve_zone(
         self, speed: FloatArray, whirls: Whirls,
@@ -294,7 +321,22 @@ class SpectrumSolver:
             size[:, None] * support.motion_spring[held, held] * size, elastic, zone.compliance,
             self.span[1], reach, zone.ends(zone.told, speed),
             tuple(zip(self.shafts.seats, self.shafts.modes, strict=True)),
+            self._below[id(zone.compliance)], unit[:, None] * self._moves(zone.compliance),
             self.shafts.slow(constant, reach * self.span[1]))
+
+    def _moves(self, compliance: Continuation) -> FloatArray:
+        """Return housing motion per motion of the support in units of its size, (2 b, s)."""
+        support = self.model.support
+        return np.asarray(support.motion_rows * np.append(
+            compliance.size, np.ones(support.elastic)))
+
+    @cached_property
+    def _below(self) -> dict[int, SupportModes]:
+        """Modes of the support in each piece, which no speed changes."""
+        unit = np.repeat(np.sqrt(self.shafts.springs), 2)[:, None]
+        return {id(piece): SupportModes.of(
+            self.model.support, piece, self.span[1], rows=unit * self._moves(piece), rough=True)
+            for piece in self.pieces}
 
     @cached_property
     def _turn(self) -> FloatArray:

@@ -17,12 +17,12 @@ from rotorsoil_ros.machine.modes.following import (
     ALONG_CURVE,
     between,
     continued,
-    CREEPING,
     first_speeds,
     followed,
     grows,
     vibrations_at,
 )
+from rotorsoil_ros.machine.modes.guesses import CREEPING
 from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 
