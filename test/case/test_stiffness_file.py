@@ -110,6 +110,7 @@ def test_every_verb_answers_on_a_file_that_knows_no_rest(tmp_path, capsys):
 
 @pytest.mark.parametrize('text, problem', [
     ('', 'is empty'),
+    ('hz;xx_re;xx_im\n1;2,0;3,0\n', 'line 1: cells must be separated by commas, and decimals'),
     ('hz,zz\n', "column 'zz' is not known; needed are omega_rad_s or hz, and xx_re"),
     ('hz,zz_re\n', 'column zz_im is missing; zz_re is there'),
     ('hz,hz,zz_re,zz_im\n', 'column hz stands here twice'),
