@@ -1,9 +1,11 @@
 """A foundation that bends answers as finite elements of all of it do."""
 
 from dataclasses import replace
+import math
 
 from foundations import (
     apart,
+    bearing,
     FOOTING,
     frame_elements,
     frame_support,
@@ -26,9 +28,11 @@ from rotorsoil_ros.ground.soil import Rectangle, RigidSoil, Soil
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.damping import DampingSplitter, SOIL, STRUCTURE
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, FlexibleBody, SEAT
+from rotorsoil_ros.machine.flexible.part import Mount
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.natural import natural_frequencies
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
+from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.bearing import Bearing
 
@@ -304,3 +308,21 @@ def test_motions_of_a_contact_may_come_in_any_order():
     found, exact = (paper_on(one, block).support.standing(omega).receptance
                     for one in (mixed, body))
     np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-20)
+
+
+@pytest.mark.parametrize('heading', [0.0, math.pi, -0.5 * math.pi, 1.78])
+def test_seat_of_a_turned_machine_moves_across_its_shaft_and_up(heading):
+    """Along e a rigid body moves by e u + (r x e) theta, wherever the shaft points."""
+    place = Placement(0.4, -0.3, heading)
+    x, y = place.point(1.5)
+    dofs = [Dof('b', axis, 'seat', (x, y, 2.0)) for axis in 'xyz']
+    dofs += [Dof('base', axis, 'contact', (0.0, 0.0, 0.0)) for axis in
+             ('x', 'y', 'z', 'rx', 'ry', 'rz')]
+    body = FlexibleBody.from_modes(
+        dofs, frequencies=np.zeros(0), shapes=np.zeros((9, 0)), residual=np.zeros((9, 9)),
+        mass=np.eye(6), loss_factor=0.0)
+    mount = Mount(bearing('b', 1.5, 'raft'), 2.0, place)
+    assert mount.point == pytest.approx((x, y, 2.0))
+    across, up = np.array([math.cos(heading), math.sin(heading), 0.0]), np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(mount.on(body) @ body.rows, [
+        [*e, *np.cross([x, y, 2.0], e)] for e in (across, up)], atol=1e-12)
