@@ -34,7 +34,7 @@ _OFF_SHAFT = 0.02
 _MATRICES, _MODES = ('stiffness', 'mass', 'dofs'), ('modes', 'residual', 'rigid')
 # What a body that bends brings along itself.
 _OWN = ('mass', 'density', 'centre_of_gravity_height', 'inertia', 'parts', 'embedment',
-        'side_contact')
+        'side_contact', 'young_modulus')
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ class FlexibleEntries:
         """Return one foundation, or raise an InputError."""
         flexible = entry.flexible
         assert flexible is not None
-        given = next((key for key in _OWN if getattr(entry, key)), None)
+        given = next((key for key in _OWN if key in entry.model_fields_set
+                      and getattr(entry, key) is not None), None)
         if given is not None:
             raise self.faults.error('foundations', index, given, problem=(
                 'belongs to a rigid block; flexible brings its own'))
@@ -77,11 +78,12 @@ class FlexibleEntries:
         height = float(mass[0, 4] / mass[0, 0])
         moments = mass.diagonal()[3:] - mass[0, 0] * np.array([height**2, height**2, 0.0])
         about_x, about_y, about_z = np.maximum(moments, 0.0).tolist()
-        return Foundation(
-            name=entry.name, contact=_outline(entry, body), centre_x=x, centre_y=y,
-            mass=float(mass[0, 0]), centre_of_gravity_height=height,
-            inertia=(about_x, about_y, about_z), height=entry.height or _drawn_height(body),
-            body=body)
+        with self.faults.at('foundations', index, entry=entry):
+            return Foundation(
+                name=entry.name, contact=_outline(entry, body), centre_x=x, centre_y=y,
+                mass=float(mass[0, 0]), centre_of_gravity_height=height,
+                inertia=(about_x, about_y, about_z), body=body,
+                height=_drawn_height(body) if entry.height is None else entry.height)
 
     def _body(self, index: int, name: str, entry: schema.FlexibleEntry) -> FlexibleBody:
         """Return the body: as it came with the document, out of the cache, or from its files."""
