@@ -13,6 +13,8 @@ export OMP_NUM_THREADS := 1
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 # A sourced ROS of another Python would hide what .venv holds.
 unexport PYTHONPATH AMENT_PREFIX_PATH
+# Tests start hundreds of processes: what all of them import is compiled once.
+unexport PYTHONDONTWRITEBYTECODE
 
 # By files: what one test of a file has built the next ones share.
 SPREAD := --numprocesses auto --maxprocesses 4 --dist loadfile
