@@ -1,4 +1,8 @@
-"""What foundations that bend cost: `python -m benchmarks.foundations` prints it by modes."""
+"""
+What foundations that bend cost, and how many rows a table of their seats needs.
+
+`python -m benchmarks.foundations` prints both.
+"""
 
 import argparse
 from dataclasses import replace
@@ -6,13 +10,18 @@ from pathlib import Path
 import time
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rotorsoil_ros.case.machine import Machine
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, FlexibleBody, SEAT
+from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
+from rotorsoil_ros.units import hz_to_rad_s
 
 MODES = (0, 10, 50)
+STEPS = (1.0, 0.25, 0.1)  # [Hz]
+FRAME = Path(__file__).parents[1] / 'examples' / 'foundations' / 'turbine_deck.yaml'
 SPEEDS, REPEATS = 300, 15
 
 
@@ -45,6 +54,22 @@ def seconds(model: CoupledModel, speed: np.ndarray, unbalance: np.ndarray) -> fl
     return min(taken)
 
 
+def rows_needed() -> None:
+    """Print how far a table of a frame's seats is off between its rows, by law and by spline."""
+    machine = Machine.load(FRAME)
+    hertz = np.linspace(5.0, 55.0, 997)
+    exact = machine.seat_receptance(hz=hertz)
+    size = np.abs(exact).max(axis=(1, 2))
+    for step in STEPS:
+        rows = np.arange(5.0, 55.0 + 0.5 * step, step)
+        values = machine.seat_receptance(hz=rows)
+        table = SeatReceptance.of(machine.seats, hz_to_rad_s(rows), values)
+        found = table.compliance(hz_to_rad_s(hertz)), CubicSpline(rows, values)(hertz)
+        law, spline = (float((np.abs(one - exact).max(axis=(1, 2)) / size).max())
+                       for one in found)
+        print(f'rows {step:g} Hz apart: the law is off by {law:.1e}, a spline by {spline:.1e}')
+
+
 def main() -> None:
     """Print the cost beside that of the rigid block, in the same run."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -57,6 +82,7 @@ def main() -> None:
         taken = seconds(on_modes(machine.model, modes), speed, machine.case.unbalance)
         print(f'{modes:3d} modes    {1e3 * taken:.2f} ms, '
               f'{taken / rigid:.2f} of the rigid block')
+    rows_needed()
 
 
 if __name__ == '__main__':

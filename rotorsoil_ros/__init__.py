@@ -50,8 +50,9 @@ if TYPE_CHECKING:
     from rotorsoil_ros.machine.coupled import CoupledModel
     from rotorsoil_ros.machine.damping import DampingSplit, DampingSplitter
     from rotorsoil_ros.machine.flexible.body import Dof, FlexibleBody
+    from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
     from rotorsoil_ros.machine.flexible.reduction import FiniteElements
-    from rotorsoil_ros.machine.foundation import Foundation
+    from rotorsoil_ros.machine.foundation import Foundation, Stand
     from rotorsoil_ros.machine.modes.campbell import Campbell
     from rotorsoil_ros.machine.modes.critical import CriticalSpeed
     from rotorsoil_ros.machine.response import Predictor, ResponseTable
@@ -81,9 +82,10 @@ __all__ = [
     'Machine', 'Matching', 'Material', 'NotSolvedError', 'Oil', 'OutOfTableError', 'Part',
     'Pedestal', 'Plan', 'Plant', 'Prediction', 'Predictor', 'Probe', 'Profile', 'Record',
     'Rectangle', 'Response', 'ResponseTable', 'RigidSoil', 'Rotor', 'RotorSoilError',
-    'ShaftSection', 'Shaken', 'Site', 'Soil', 'SoilModel', 'SoilSpread', 'SpeedSource', 'Study',
-    'ThinLayerModel', 'Transmissibility', 'Verdict', 'Viscosity', 'Wish', 'compare', 'export_log',
-    'import_table', 'load', 'predict_many', 'read_flexible', 'read_profile', 'study',
+    'SeatReceptance', 'ShaftSection', 'Shaken', 'Site', 'Soil', 'SoilModel', 'SoilSpread',
+    'SpeedSource', 'Stand', 'Study', 'ThinLayerModel', 'Transmissibility', 'Verdict', 'Viscosity',
+    'Wish', 'compare', 'export_log', 'import_table', 'load', 'predict_many', 'read_flexible',
+    'read_profile', 'study',
 ]
 
 # Which room a public name lives in.
@@ -116,8 +118,9 @@ _ROOMS = {
     'machine.coupled': ('CoupledModel',),
     'machine.damping': ('DampingSplit', 'DampingSplitter'),
     'machine.flexible.body': ('Dof', 'FlexibleBody'),
+    'machine.flexible.receptance': ('SeatReceptance',),
     'machine.flexible.reduction': ('FiniteElements',),
-    'machine.foundation': ('Foundation',),
+    'machine.foundation': ('Foundation', 'Stand'),
     'machine.modes.campbell': ('Campbell',),
     'machine.modes.critical': ('CriticalSpeed',),
     'machine.response': ('Predictor', 'ResponseTable'),

@@ -1,6 +1,8 @@
 """Which blocks the entries of a case file describe, and what follows where they say less."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 import math
 from pathlib import Path
 
@@ -8,6 +10,7 @@ from rotorsoil_ros.case import cache, schema
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.entries.entry import Place
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS
+from rotorsoil_ros.case.flexible.stacking import StackEntries
 from rotorsoil_ros.errors import require
 from rotorsoil_ros.ground.accuracy import gap
 from rotorsoil_ros.ground.plan import Part, Plan
@@ -34,11 +37,30 @@ class BlockEntries:
 
     def foundations(self) -> tuple[Foundation, ...] | None:
         """Return the blocks, or None where one is at fault."""
-        entries = self.faults.entries.foundations
-        blocks = self.faults.attempt_each(self._foundation, entries)
-        if blocks is not None and all(map(self._stands, entries)):
+        entries, built = self.faults.entries.foundations, dict[int, Foundation]()
+        for index in self._stack.order():
+            below = {block.name: block for block in built.values()}
+            found = self.faults.attempt(partial(self._foundation, index, entries[index], below))
+            if found is not None:
+                built[index] = found
+        if len(built) < len(entries):
+            return None
+        blocks = tuple(built[index] for index in range(len(entries)))
+        if self._is_restacked:
+            return blocks
+        self.faults.attempt(lambda: self._stack.refuse_shared_places(blocks))
+        if all(map(self._stands, entries)):
             self.faults.attempt(lambda: self._refuse_overlap(blocks))
         return blocks
+
+    @property
+    def _is_restacked(self) -> bool:
+        """Whether nobody knows what stands on what, as what the file says of it is wrong."""
+        return any(place[:1] == ('foundations',) and 'on' in place[2:3] for place in self.mended)
+
+    @property
+    def _stack(self) -> StackEntries:
+        return StackEntries(self.faults)
 
     @property
     def _is_undecided(self) -> bool:
@@ -65,6 +87,8 @@ class BlockEntries:
         """Raise an InputError at the second of two blocks that stand on the same ground."""
         for second, block in enumerate(foundations):
             for first, other in enumerate(foundations[:second]):
+                if (block.on and block.on.foundation) != (other.on and other.on.foundation):
+                    continue
                 x, y = (abs(block.centre_x - other.centre_x), abs(block.centre_y - other.centre_y))
                 clear = gap(block.contact, other.contact, apart=(
                     other.centre_x - block.centre_x, other.centre_y - block.centre_y))
@@ -75,21 +99,34 @@ class BlockEntries:
                         f'{other.name} (foundations.{first}), got {-clear:.4g} m of overlap'
                         f'{" along y" if x == 0.0 else ""}: centres are {where} apart')
 
-    def _foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
+    def _foundation(
+        self, index: int, entry: schema.FoundationEntry, below: Mapping[str, Foundation],
+    ) -> Foundation:
         seats = self._seats(entry)
         # Another machine, or the ground between blocks, may need one that carries none of this.
         coupled = bool(self.faults.under) or (
             self.faults.entries.support.model == BOUNDARY_ELEMENTS)
-        if not seats and not self._is_undecided and not (
+        # So may others that stand on it or below.
+        if self._is_restacked or not self._stack.is_known:
+            pass
+        elif entry.on is not None or self._stack.is_carrying(entry.name):
+            self._require_place(index, entry)
+        elif not seats and not self._is_undecided and not (
                 coupled and entry.centre_y is not None):
             self.faults.found.append(self.faults.error('foundations', index, problem=(
                 f'no bearing stands on {entry.name}' + ('; a block beside the machine needs '
                                                         'centre_y in m' if coupled else ''))))
-        if any(place[:3] == ('foundations', index, 'flexible') for place in self.mended):
-            # Nobody can make up files: what else is wrong is looked for.
+        mended = {place[:3] for place in self.mended}
+        own = ('foundations', index)
+        if (*own, 'flexible') in mended or (
+                entry.flexible is not None and mended & {own, (*own, 'on')}):
+            # Nobody can make up files, nor what stands on what they tell: what else is wrong is
+            # looked for.
             return replace(_STAND_IN, name=entry.name)
+        if (*own, 'on') in mended:
+            entry = entry.model_copy(update={'on': None})
         if entry.flexible is not None:
-            return self._flexible(index, entry)
+            return self._flexible(index, entry, below)
         if entry.soil_under is not None:
             raise self.faults.error('foundations', index, 'soil_under', problem=(
                 'belongs to a foundation that bends, and flexible is missing'))
@@ -105,13 +142,25 @@ class BlockEntries:
             product = 0.0
             if isinstance(contact, Plan) and entry.inertia is None:
                 product = mass * contact.product_moment / contact.area
-            return Foundation(
+            block = Foundation(
                 name=entry.name, contact=contact, mass=mass, centre_x=entry.centre_x + x,
                 centre_y=along + y, centre_of_gravity_height=centre, inertia=inertia,
                 height=entry.height, inertia_product=product,
                 young_modulus=entry.young_modulus)
+        return self._stack.stood(index, entry, block, below)
 
-    def _flexible(self, index: int, entry: schema.FoundationEntry) -> Foundation:
+    def _require_place(self, index: int, entry: schema.FoundationEntry) -> None:
+        """Keep a fault for a block in a stack of which nobody says where it is."""
+        placed = entry.on is not None and (
+            entry.on.place is not None or entry.on.places is not None)
+        if (entry.centre_y is None and not placed and entry.flexible is None
+                and not self._seats(entry) and not self._is_undecided):
+            self.faults.found.append(self.faults.error('foundations', index, 'centre_y', problem=(
+                f'is missing: no bearing stands on {entry.name}, which would say where it is')))
+
+    def _flexible(
+        self, index: int, entry: schema.FoundationEntry, below: Mapping[str, Foundation],
+    ) -> Foundation:
         # Sparse matrices and their files take a third of a second to import.
         from rotorsoil_ros.case.flexible.entries import FlexibleEntries
 
@@ -120,7 +169,7 @@ class BlockEntries:
                 'needs speed_range_rpm, up to which it has to be known'))
         kept = cache.Cache(cache.directory(self.cache_directory))
         return FlexibleEntries(self.faults, self.files, self.speed_range[1], kept).foundation(
-            index, entry)
+            index, entry, below)
 
     def _body(
         self, index: int, entry: schema.FoundationEntry, contact: Contact,

@@ -348,6 +348,8 @@ class _Builder:
 
         def reach(index: int, block: Foundation) -> None:
             with self.faults.at('foundations', index):
+                if block.on is not None:
+                    return
                 if model == THIN_LAYERS and ground is not None:
                     proportions(ground, block.contact, case.embedments[index], case.speed_range)
                 elif model == 'infinite_elements' and soil is not None:

@@ -66,7 +66,8 @@ def soil_keys(case: config.Case) -> list[str]:
     if case.support.model == THIN_LAYERS and case.ground is not None:
         return [tables.layers_key(proportions(
             case.ground, block.contact, embedment, case.speed_range))
-            for block, embedment in zip(case.foundations, case.embedments, strict=True)]
+            for block, embedment in zip(case.foundations, case.embedments, strict=True)
+            if block.on is None]
     if case.support.model == BOUNDARY_ELEMENTS and soil is not None:
         site = site_of(case.foundations, case.ground_probes)
         if case.ground is not None:
@@ -77,6 +78,8 @@ def soil_keys(case: config.Case) -> list[str]:
         return []
     keys = []
     for foundation in case.foundations:
+        if foundation.on is not None:
+            continue
         low, high = infinite_range(soil, foundation.contact, geometry, case.speed_range)
         covered = a0_range(soil, foundation.contact, geometry, omega_min=low, omega_max=high)
         keys.append(tables.compliance_key(soil, geometry, *covered))

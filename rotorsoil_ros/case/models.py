@@ -22,7 +22,7 @@ from rotorsoil_ros.case.design.tables import (
     thin_layer_model,
 )
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
-from rotorsoil_ros.case.flexible.ground import bed_of
+from rotorsoil_ros.case.flexible.ground import bed_of, welded
 from rotorsoil_ros.case.summary import stability_doubts, unstable
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import RotorSoilError, solved
@@ -164,7 +164,8 @@ def moving_ground(case: Case, model: CoupledModel, directory: Path) -> MovingGro
     else:
         table = GroundTable.from_arrays(arrays, model.channels)
     loads = np.array([model.channels.index(Channel(block.name, '', dof))
-                      for block in model.foundations for dof in DOFS], dtype=int)
+                      for block in model.foundations if block.on is None
+                      for dof in DOFS], dtype=int)
     sensors = len(case.sensors.ground)
     others = () if case.berth is None else tuple(
         one.speed for one in case.berth.neighbours if one.speed)
@@ -256,7 +257,7 @@ def _other_grounds(
         return lambda contact: thin_layer_model(ground, contact, embedment, cache=cache,
                                                 speed_range=speeds)
 
-    return tuple(bed_of(block, under(*own), _no_coupling)
+    return tuple(bed_of(block, under(*own), _no_coupling) if block.on is None else welded(block)
                  for block, own in zip(case.foundations, grounds, strict=True))
 
 

@@ -129,7 +129,7 @@ def _of_film(place: str, journal: Journal) -> Iterator[str]:
 
 def _of_block(case: Case, place: str, block: Foundation) -> Iterator[str]:
     carried = case.rotor.mass / len(case.foundations)
-    if case.support.model == 'rigid' or block.mass <= 0.0:
+    if case.support.model == 'rigid' or block.mass <= 0.0 or block.on is not None:
         return
     if block.mass < _LEAST_MASS_RATIO * carried:
         yield (f'{place}.mass: {_number(block.mass)} kg below a rotor of {case.rotor.mass:.4g} '

@@ -119,6 +119,14 @@ class FlexibleEntry(Entry):
     rigid_contact: StrictBool = False
 
 
+class OnEntry(Entry):
+    """Foundation below another, and on which of its places it stands."""
+
+    foundation: Name
+    place: Name | None = None
+    places: dict[Name, Name] | None = None
+
+
 class FoundationEntry(Entry):
     """Block; its contact is a rectangle, a circle or a plan of several rectangles."""
 
@@ -140,6 +148,7 @@ class FoundationEntry(Entry):
     side_contact: Ratio | None = None
     stiffness_file: FileName | None = None
     flexible: FlexibleEntry | None = None
+    on: OnEntry | None = None
     soil_under: Literal['winkler', 'green', 'each'] | None = None
 
 

@@ -27,14 +27,13 @@ from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.ground.accuracy import ShapeError
 from rotorsoil_ros.ground.bed import as_one
 from rotorsoil_ros.ground.soil import (
-    below_each,
     equivalent_radii,
     singular_of,
     Soil,
     SoilModel,
 )
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.foundation import Foundation, soils_below
 from rotorsoil_ros.machine.modes.stability import Stability
 from rotorsoil_ros.machine.response import ResponseTable
 from rotorsoil_ros.units import rad_s_to_hz, rad_s_to_rpm, Units
@@ -88,7 +87,7 @@ def derived_quantities(
         yield 'shear wave speed c_s', f'{case.soil.shear_wave_speed:.5g} m/s'
         yield 'dilatational wave speed c_p', f'{case.soil.pressure_wave_speed:.5g} m/s'
     yield from layers_told(case)
-    below = map(as_one, below_each(soil_models, len(case.foundations)))
+    below = map(as_one, soils_below(case.foundations, soil_models))
     for foundation, model, shape in itertools.zip_longest(case.foundations, below, shapes):
         yield from _of_foundation(case, foundation, model)
         told = model_error(case, foundation, shape)
@@ -111,6 +110,10 @@ def _of_foundation(
 ) -> Iterator[tuple[str, str]]:
     name = foundation.name
     yield f'{name}: mass over rotor mass', f'{foundation.mass / case.rotor.mass:.4g}'
+    if (on := foundation.on) is not None:
+        places = f' at {", ".join(on.places)}' if on.places else ''
+        yield f'{name}: stands on', f'{on.foundation}{places}, {on.elevation:.4g} m up'
+        return
     if case.soil is not None:
         radius = equivalent_radii(foundation.contact)[2]
         yield f'{name}: mass ratio m / (rho r0^3)', (
@@ -170,7 +173,8 @@ def warnings(case: Case, shapes: Sequence[ShapeError | None] = ()) -> Iterator[s
         if large > (1.0 + 1e-9) * (small + medium):
             yield (f'{foundation.name}: inertia {large:g} kg m^2 about one axis is more than '
                    'that about both others, which no body has')
-        if case.soil is not None and case.support.model != 'rigid':
+        if (case.soil is not None and case.support.model != 'rigid'
+                and foundation.on is None):
             yield from _of_soil(case, case.soil, foundation)
 
 

@@ -103,16 +103,18 @@ def _contact(
     How it gives way are six rows under loads on itself and on those that share its ground.
     """
     model = machine.model
-    names = [block.name for block in model.foundations]
+    grounded = [block for block in model.foundations if block.on is None]
+    names = [block.name for block in grounded]
     if name is None and len(names) == 1:
         [name] = names
     if name is None or name not in names:
         raise InputError(f'{machine.case.path}: foundations: --foundation must be one of '
                          f'{", ".join(names) or "none, there is no block"}, got {name}')
     index = names.index(name)
-    soil = model.support.soils[index]
+    block = grounded[index]
+    soil = model.support.soils[list(model.foundations).index(block)]
     if not isinstance(soil, OneOfBlocks):
-        return model.foundations[index], soil.compliance, []
+        return block, soil.compliance, []
     own, ground = slice(6 * index, 6 * index + 6), soil.ground
 
     def rows(omega: FloatArray) -> ComplexArray:
@@ -120,7 +122,7 @@ def _contact(
         return np.concatenate([found[..., own], found[..., :own.start], found[..., own.stop:]],
                               axis=-1)
 
-    return model.foundations[index], rows, names[:index] + names[index + 1:]
+    return block, rows, names[:index] + names[index + 1:]
 
 
 def response(arguments: Namespace) -> int:

@@ -66,7 +66,7 @@ def _modes(case: Case, model: CoupledModel) -> Iterator[_Shape]:
     for one in felt[:_MOST_MODES]:
         yield _Shape(f'{names.of_critical(one)}\n{one.speed_rpm:.0f} rpm, damping '
                      f'{one.damping_ratio:.2g}', support.mounts, points,
-                     support.point_motion @ one.support)
+                     support.point_motion[:support.told_points.stop] @ one.support)
 
 
 def _operating(case: Case, model: CoupledModel) -> _Shape:

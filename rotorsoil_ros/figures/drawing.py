@@ -148,8 +148,8 @@ def _draw_blocks(axes: Axes, case: Case, *, across: bool, words: bool) -> None:
     for block in case.foundations:
         first, last = sides(block, across=across)
         if block.is_solid:
-            axes.add_patch(Box((first, 0.0), last - first, block.drawn_height, zorder=1,
-                               facecolor=CONCRETE, **_EDGE))
+            axes.add_patch(Box((first, block.elevation), last - first, block.drawn_height,
+                               zorder=1, facecolor=CONCRETE, **_EDGE))
         else:
             lattice = Lattice.whole(block, mounts(case))
             for line in lattice.lines(np.zeros_like(lattice.places)):
@@ -159,7 +159,8 @@ def _draw_blocks(axes: Axes, case: Case, *, across: bool, words: bool) -> None:
         # One beside the shaft is behind the others: the view along it has its name.
         if (left < 0.0 < right) is words:
             mass = f', {block.mass:.0f} kg' if words else ''
-            axes.annotate(f'{block.name}{mass}', (0.5 * (first + last), 0.5 * block.drawn_height),
+            axes.annotate(f'{block.name}{mass}', (0.5 * (first + last),
+                          block.elevation + 0.5 * block.drawn_height),
                           ha='center', va='center', fontsize=7, zorder=1.5)
 
 
@@ -314,5 +315,5 @@ def _label(axes: Axes, text: str, along: float, height: float, *, points: int) -
 
 def _foot(case: Case, bearing: Bearing) -> float:
     """Return the height of what a bearing stands on [m]."""
-    return next((block.drawn_height for block in case.foundations
+    return next((block.elevation + block.drawn_height for block in case.foundations
                  if block.name == bearing.foundation), 0.0)

@@ -292,8 +292,10 @@ def on_soils(
     """
     of = of or _below_deepest(model)
     return [replace(model, soil_models=tuple(
-        on_soil(own, soil, block.contact, of=of)
-        # One ground below all blocks needs none of their contacts.
+        # What stands on another has no soil; one ground below all blocks needs none of their
+        # contacts.
+        own if len(model.soil_models) > 1 and block.on is not None else on_soil(
+            own, soil, block.contact, of=of)
         for own, block in zip(model.soil_models, model.foundations, strict=False)))
         for soil in soils]
 

@@ -144,7 +144,8 @@ class DampingSplitter:
                 *((PEDESTALS, bearing.name) for bearing in bearings
                   if bearing.pedestal is not None),
                 *((STRUCTURE, block.name) for block in self._bending),
-                *((kind, block.name) for kind in soil for block in self.model.foundations),
+                *((kind, block.name) for kind in soil for block in self.model.foundations
+                  if block.on is None),
                 *((BELOW, 'table') for _ in range(self.model.support.table is not None)),
                 *((_OF_SHAFT[index], name or 'rotor') for name, losing in zip(
                     self.model.machines, self._losing, strict=True) for index in losing))
@@ -185,14 +186,17 @@ class DampingSplitter:
         motion, into_soil = (flat - deflection, below) if support.table is not None else (
             found.displacement[:, contacts], found.force[:, contacts])
         own, arriving = support.pedestal_axes, ((flat - deflection).conj() * below).imag
-        structure = [arriving[:, list(part.seats)].sum(axis=1) - taken for part, taken in zip(
-            support.members, self._by_foundation(motion, into_soil).T, strict=True)]
+        taken = self._by_foundation(motion, into_soil).T
+        structure = [arriving[:, list(part.seats)].sum(axis=1) - taken[index] + taken[list(
+            support.above[index])].sum(axis=0) for index, (part, _) in enumerate(
+                zip(support.members, support.foundations, strict=False))]
         radiated = None if self._lossless is None else _pushed(
             self._lossless.ground(speed), motion)
-        taken = self._taken(journal - housing, through, deflection[:, own], below[:, own], motion,
-                            into_soil, radiated, structure)
+        all_taken = self._taken(journal - housing, through, deflection[:, own], below[:, own],
+                                motion, into_soil, radiated, structure)
         lost = self._lost(speed, self._whirls(speed, unbalance, journal, through))
-        return DampingSplit(speed, self.parts, math.pi * np.concatenate([taken, lost], axis=1))
+        return DampingSplit(speed, self.parts,
+                            math.pi * np.concatenate([all_taken, lost], axis=1))
 
     def _whirls(
         self, speed: FloatArray, unbalance: ComplexArray, journal: ComplexArray,
@@ -280,14 +284,15 @@ class DampingSplitter:
         pressed = support.motion_spring @ critical.support
         below = (support.motion_rows.T @ through - pressed
                  + w**2 * (support.motion_mass @ critical.support))[None]
-        bent = (critical.support.conj() * pressed).imag
+        bent = [np.vdot(critical.support, spring @ critical.support).imag
+                for spring in support.bent_springs]
         axes = slice(blocks, blocks + len(support.pedestal_axes))
         motion = critical.support[None, :blocks]
         radiated = None if lossless is None else _pushed(lossless, motion)
         taken = self._taken(
             gap.reshape(pairs), through.reshape(pairs), critical.support[None, axes],
             below[:, axes], motion, below[:, :blocks], radiated,
-            [bent[own].sum(keepdims=True) for own in support.motions])
+            [np.array([one]) for one in bent])
         whirls = [(np.stack(shape, axis=1).reshape(-1, 2) @ ORBITS.conj().T).T[:, None]
                   for shape in shapes]
         lost = self._lost(speed, whirls, np.array([w]))
@@ -304,10 +309,12 @@ class DampingSplitter:
         springs = (deflection.conj() * below).imag.reshape(rows, -1, 2).sum(axis=2)
         bends = [taken[:, None] for taken, block in zip(
             structure, self.model.foundations, strict=False) if block.body is not None]
-        soil = self._by_foundation(motion, into_soil)
+        higher = [index for above in self.model.support.above for index in above]
+        grounded = np.setdiff1d(np.arange(len(self.model.support.members)), higher)
+        soil = self._by_foundation(motion, into_soil)[:, grounded]
         if radiated is None:
             return np.concatenate([films, springs, *bends, soil], axis=1)
-        waves = self._by_foundation(motion, radiated)
+        waves = self._by_foundation(motion, radiated)[:, grounded]
         return np.concatenate([films, springs, *bends, waves, soil - waves], axis=1)
 
     def _by_foundation(self, motion: ComplexArray, force: ComplexArray) -> FloatArray:

@@ -1,6 +1,7 @@
 """How a rigid block on the soil moves under the bearings that stand on it."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 import math
 
@@ -8,9 +9,10 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import NotSolvedError, require
-from rotorsoil_ros.ground.soil import Contact
-from rotorsoil_ros.machine.flexible.body import FlexibleBody, GREEN, WINKLER
+from rotorsoil_ros.ground.soil import below_each, Contact, RigidSoil, SharedGround, SoilModel
+from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, FlexibleBody, GREEN, WINKLER
 from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
 
 # Young's modulus of what most blocks are made of [Pa].
@@ -24,6 +26,27 @@ def solid_inertia(
     x, y, z = (mass * moment / contact.area for moment in contact.second_moments)
     upright = mass * height**2 / 12.0
     return x + upright, y + upright, z
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """
+    What a foundation stands on in place of the ground.
+
+    Attributes
+    ----------
+    foundation : str
+        Name of that below.
+    places : tuple of str
+        Of that below, one for each contact in their order; none on a rigid block.
+    elevation : float
+        Of the contact above that of the lowest foundation [m].
+
+    """
+
+    foundation: str
+    places: tuple[str, ...]
+    elevation: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +78,8 @@ class Foundation:
         Of what it is made of [Pa]; whether it is rigid depends on it, and nothing else.
     body : FlexibleBody or None
         What it is where it bends: then mass and inertia above are for people only.
+    on : Stand or None
+        What carries it; None is the ground.
 
     """
 
@@ -69,6 +94,7 @@ class Foundation:
     inertia_product: float = 0.0
     young_modulus: float = CONCRETE
     body: FlexibleBody | None = None
+    on: Stand | None = None
 
     def __post_init__(self) -> None:
         require(0.0 <= self.mass < math.inf, 'mass', '>= 0 kg and finite', self.mass)
@@ -88,6 +114,46 @@ class Foundation:
     def is_solid(self) -> bool:
         """Whether it fills its outline: blocks and rafts do, frames on footings do not."""
         return self.body is None or self.body.bed in (WINKLER, GREEN)
+
+    @property
+    def elevation(self) -> float:
+        """Height of its contact above that of the lowest foundation [m]."""
+        return 0.0 if self.on is None else self.on.elevation
+
+    @property
+    def footing(self) -> list[Dof]:
+        """Motions of its contacts, their places counted from the centre of all of them."""
+        if self.body is None:
+            return [Dof(self.name, axis, CONTACT, (0.0, 0.0, 0.0)) for axis in DOFS]
+        middle = np.array(self.body.centre)
+        own = [self.body.dofs[row] for row in self.body.contacts.tolist()]
+        places = [(np.array(dof.place) - middle).tolist() for dof in own]
+        return [replace(dof, place=(x, y, z))
+                for dof, (x, y, z) in zip(own, places, strict=True)]
+
+    def under(self, above: 'Foundation') -> FloatArray:
+        """
+        Return how it moves below the contacts of another that stands on it.
+
+        Per rigid motion about its own contact (c, 6), or per motion of its interface (c, p) if it
+        bends.
+
+        Raises
+        ------
+        RotorSoilError
+            If there is no such place, or it has not the motions that are needed.
+
+        """
+        assert above.on is not None
+        if self.body is None:
+            x, y, z = (above.centre_x - self.centre_x, above.centre_y - self.centre_y,
+                       above.elevation - self.elevation)
+            return np.array([replace(dof, place=(
+                dof.place[0] + x, dof.place[1] + y, dof.place[2] + z)).rigid_row
+                for dof in above.footing])
+        names = dict(zip(dict.fromkeys(dof.station for dof in above.footing), above.on.places,
+                         strict=True))
+        return np.array([self.body.motion(names[dof.station], dof.axis) for dof in above.footing])
 
     @property
     def drawn_height(self) -> float:
@@ -129,6 +195,17 @@ class Foundation:
         """
         return place.seat_rows(position=position, height=height,
                                centre=(self.centre_x, self.centre_y))
+
+
+def soils_below(
+    foundations: Sequence[Foundation], models: Sequence[SoilModel],
+) -> tuple[SoilModel, ...]:
+    """Return what each of some foundations stands on; what stands on another, on nothing soft."""
+    grounded = [one.on is None for one in foundations]
+    if len(models) != 1 or not isinstance(models[0], SharedGround):
+        return below_each(models, len(grounded))
+    found = iter(below_each(models, sum(grounded)))
+    return tuple(next(found) if own else RigidSoil() for own in grounded)
 
 
 @dataclass(frozen=True, slots=True)

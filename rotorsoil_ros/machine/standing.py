@@ -115,7 +115,9 @@ class OnBodies:
 
         (N + H_cc) r - R_c a = H_c f,    R_c^T r - w^2 M a = R^T f,
 
-    H being the elastic motion per force; what moves is x = H f - H_c^T r + R a. Nothing is
+    H being the elastic motion per force; what moves is x = H f - H_c^T r + R a. A contact on
+    another body moves against the place below it, with no N between: rows c are its own less
+    those of that place. Nothing is
     inverted that may be zero: rigid ground has N = 0, a rigid body H = 0.
 
     References
@@ -132,11 +134,16 @@ class OnBodies:
         return self.support.flexibility(self.omega)
 
     @cached_property
+    def _parted(self) -> ComplexArray:
+        """Elastic motion of contacts against what is below, per force on the points."""
+        return self.support.parted(self._flexibility)
+
+    @cached_property
     def _system(self) -> tuple[ComplexArray, FloatArray]:
         """The matrix over r in units of its second value and a, (n, c + 6 f, c + 6 f)."""
-        support, contacts = self.support, self.support.contact_points
-        gives = support.ground(self.omega) + self._flexibility[:, contacts, contacts]
-        rows, own = support.point_rows[contacts], gives.shape[1]
+        support = self.support
+        gives = support.ground(self.omega) + support.parted(self._parted.swapaxes(1, 2))
+        rows, own = support.parted(support.point_rows), gives.shape[1]
         size = np.abs(gives).mean(axis=(1, 2))
         # Where nothing gives any size will do.
         unit = 1.0 / np.where(size > 0.0, size, 1.0)
@@ -178,13 +185,13 @@ class OnBodies:
 
     def _answer(self, loads: ComplexArray, ground: FloatArray) -> ComplexArray:
         """Return what loads (p, k) and moving ground do to the points, and r, (n, p + c, k)."""
-        contacts, rows = self.support.contact_points, self.support.point_rows
+        support, rows = self.support, self.support.point_rows
         elastic = self._flexibility @ loads
-        solve = (self._on_patches if any(part.is_patched for part in self.support.members)
-                 else self._on_one_contact_each)
-        force, rigid = solve(elastic[:, contacts] - self.support.follow_rows @ ground,
-                             rows.T @ loads)
-        moved = elastic - self._flexibility[:, :, contacts] @ force + rows @ rigid
+        solve = (self._on_patches if support.is_stacked or any(
+            part.is_patched for part in support.members) else self._on_one_contact_each)
+        follows = support.follow_rows @ ground if ground.any() else 0.0
+        force, rigid = solve(support.parted(elastic) - follows, rows.T @ loads)
+        moved = elastic - self._parted.swapaxes(1, 2) @ force + rows @ rigid
         return np.concatenate([moved, force], axis=1)
 
     @cached_property
@@ -202,9 +209,10 @@ class OnBodies:
         self, loads: ComplexArray, ground: FloatArray,
     ) -> tuple[ComplexArray, ComplexArray]:
         """Return the motion of the seats, and of points and r, under loads and moving ground."""
-        seats = 2 * len(self.support.bearings)
-        points = self.support.place_rows.T @ loads
-        found = self._answer(np.concatenate([np.zeros((seats, loads.shape[1])), points]), ground)
+        support, seats = self.support, 2 * len(self.support.bearings)
+        points = np.zeros((len(support.point_rows), loads.shape[1]), dtype=complex)
+        points[support.told_points] = support.place_rows.T @ loads
+        found = self._answer(points, ground)
         return found[:, :seats], found
 
     def answered(
@@ -213,9 +221,8 @@ class OnBodies:
         """Return motion of the places and force into the ground, (n, l, k), (n, g, k)."""
         support = self.support
         total = self._by_seats @ at_seats + pushed
-        points, seats = len(support.point_rows), 2 * len(support.bearings)
-        return (support.place_rows @ total[:, seats:points],
-                support.force_rows @ total[:, points:])
+        return (support.place_rows @ total[:, support.told_points],
+                support.force_rows @ total[:, len(support.point_rows):])
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """How the bearing housings move under the forces that the bearings put into them."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
@@ -8,51 +7,21 @@ import math
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray, side_by_side
-from rotorsoil_ros.channel import Channel, DOFS
+from rotorsoil_ros.arrays import ComplexArray, FloatArray, side_by_side
 from rotorsoil_ros.errors import OutOfTableError, RotorSoilError
 from rotorsoil_ros.ground.bed import as_one, below_patches
-from rotorsoil_ros.ground.soil import (
-    below_each,
-    SharedGround,
-    SoilModel,
-)
+from rotorsoil_ros.ground.soil import SharedGround, SoilModel
 from rotorsoil_ros.ground.table import ComplianceTable
-from rotorsoil_ros.machine.flexible.part import FoundationPart, Mount
+from rotorsoil_ros.machine.flexible.points import SupportPoints
 from rotorsoil_ros.machine.flexible.receptance import SeatReceptance
-from rotorsoil_ros.machine.foundation import BlockReceptance, Foundation
-from rotorsoil_ros.machine.placement import AT_ORIGIN, Placement
+from rotorsoil_ros.machine.foundation import BlockReceptance, soils_below
 from rotorsoil_ros.machine.standing import Below, OnBlocks, OnBodies, Standing
-from rotorsoil_ros.rotor.bearing import Bearing
 from rotorsoil_ros.units import rad_s_to_hz
 
 
 @dataclass(frozen=True)
-class Support:
-    """
-    Blocks on soil, and pedestals on them, below the bearings.
-
-    Attributes
-    ----------
-    bearings : sequence of Bearing
-        What stands on the blocks.
-    shaft_height : float
-        Of the bearings above the contact plane [m].
-    foundations : sequence of Foundation
-        The blocks.
-    soil_models : sequence of SoilModel
-        The soil under each, or one `SharedGround` under all of them; or one `SeatReceptance` of
-        the foundations and the ground below them, of which there are none then.
-    place : Placement
-        Where the shaft of the bearings lies.
-
-    """
-
-    bearings: Sequence[Bearing]
-    shaft_height: float
-    foundations: Sequence[Foundation]
-    soil_models: Sequence[SoilModel]
-    place: Placement = AT_ORIGIN
+class Support(SupportPoints):
+    """Blocks on soil, and pedestals on them, below the bearings."""
 
     def __post_init__(self) -> None:
         _ = self.soils
@@ -68,13 +37,7 @@ class Support:
     @cached_property
     def soils(self) -> tuple[SoilModel, ...]:
         """What each block stands on, as if the others were not loaded."""
-        return tuple(map(as_one, below_each(self.soil_models, len(self.foundations))))
-
-    @cached_property
-    def table(self) -> SeatReceptance | None:
-        """What stands for foundations and ground together, if anything does."""
-        first = self.soil_models[0] if len(self.soil_models) == 1 else None
-        return first if isinstance(first, SeatReceptance) else None
+        return tuple(map(as_one, soils_below(self.foundations, self.soil_models)))
 
     @property
     def _shared(self) -> SharedGround | None:
@@ -85,161 +48,24 @@ class Support:
     def ground(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of the ground under all contacts, (n, c, c), six of a block."""
         if self._shared is not None:
-            return self._shared.compliance(omega)
+            return self._on_grounded(self._on_grounded(
+                self._shared.compliance(omega)).swapaxes(1, 2))
         found = [model.compliance(omega) for model in self.soil_models]
         return side_by_side(found, len(omega))
+
+    def _on_grounded(self, own: ComplexArray) -> ComplexArray:
+        """Return columns (n, k, 6 g) of what stands on the ground among those of all contacts."""
+        if not self.is_stacked:
+            return own
+        total = np.zeros((*own.shape[:2], self.contacts), dtype=complex)
+        total[..., np.setdiff1d(np.arange(self.contacts), self.stacked[0])] = own
+        return total
 
     def points(self, omega: FloatArray) -> ComplexArray:
         """Return the motion of points on the ground per load of the blocks, (n, 3 p, 6 f)."""
         if self._shared is not None:
-            return self._shared.point_motion(omega)
+            return self._on_grounded(self._shared.point_motion(omega))
         return np.zeros((len(omega), 0, self.transmitting), dtype=complex)
-
-    @cached_property
-    def members(self) -> tuple[FoundationPart, ...]:
-        """Every foundation by its points, or what stands for all of them."""
-        if self.table is not None:
-            return (FoundationPart.tabulated(self.table, self.mounts),)
-        return tuple(FoundationPart.of(foundation, self.mounts)
-                     for foundation in self.foundations)
-
-    @property
-    def mounts(self) -> list[Mount]:
-        """Where every bearing is."""
-        return [Mount(bearing, self.shaft_height, self.place) for bearing in self.bearings]
-
-    @cached_property
-    def firm_rows(self) -> FloatArray:
-        """Motion per unit motion (x, y, z) of the ground, (2 b, 3), of what stands on no block."""
-        firm = self.table is None
-        return np.concatenate([np.zeros((0, 3)), *(
-            mount.axes * (firm and mount.bearing.foundation is None) for mount in self.mounts)])
-
-    @cached_property
-    def follow_rows(self) -> FloatArray:
-        """Motion of the contacts per unit motion (x, y, z) of the ground, (c, 3)."""
-        if self.table is not None:
-            raise RotorSoilError('receptances of seats do not tell how these follow ground that '
-                                 'moves: give foundation and ground')
-        axes = [channel.axis for part in self.members for channel in part.contacts]
-        return np.array([[float(axis == along) for along in DOFS[:3]]
-                         for axis in axes]).reshape(-1, 3)
-
-    @property
-    def bends(self) -> bool:
-        """Whether some foundation does."""
-        return any(foundation.body is not None for foundation in self.foundations)
-
-    @cached_property
-    def places(self) -> tuple[Channel, ...]:
-        """Motions of the foundations: six of each, then its patches and probes if it bends."""
-        bodies = [(block.name, block.body) for block in self.foundations
-                  if block.body is not None]
-        patches = [channel for name, body in bodies if not body.has_one_contact
-                   for channel in body.channels(name)[0]]
-        return (*(Channel(block.name, '', dof) for block in self.foundations for dof in DOFS),
-                *patches, *self._probes)
-
-    @property
-    def _probes(self) -> list[Channel]:
-        return [channel for block in self.foundations if block.body is not None
-                for channel in block.body.channels(block.name)[1]]
-
-    @property
-    def transmitting(self) -> int:
-        """How many of the places, the first, stand on the ground."""
-        return len(self.places) - len(self._probes)
-
-    @cached_property
-    def contacts(self) -> int:
-        """Number of motions that the ground resists, c."""
-        return sum(len(part.contacts) for part in self.members)
-
-    @property
-    def contact_points(self) -> slice:
-        """Where among the points the contacts are: behind all seats."""
-        return slice(2 * len(self.bearings), 2 * len(self.bearings) + self.contacts)
-
-    @cached_property
-    def point_indices(self) -> tuple[IntArray, ...]:
-        """Which points of all are those of each part: seats, contacts, probes."""
-        contact = 2 * len(self.bearings)
-        probe = contact + self.contacts
-        found = []
-        for part in self.members:
-            ends = contact + len(part.contacts), probe + len(part.probes)
-            found.append(np.array([*part.seats, *range(contact, ends[0]), *range(probe, ends[1])],
-                                  dtype=int))
-            contact, probe = ends
-        return tuple(found)
-
-    @cached_property
-    def point_rows(self) -> FloatArray:
-        """Motion of seats, contacts and probes per rigid motion of all foundations, (p, 6 f)."""
-        count = 2 * len(self.bearings) + sum(
-            len(part.contacts) + len(part.probes) for part in self.members)
-        rows, first = np.zeros((count, len(self.block_mass))), 0
-        for part, own in zip(self.members, self.point_indices, strict=True):
-            rows[own, first:first + len(part.mass)] = part.rows
-            first += len(part.mass)
-        return rows
-
-    def flexibility(self, omega: FloatArray) -> ComplexArray:
-        """Return the elastic motion of the points per force on them, (n, p, p)."""
-        count = len(self.point_rows)
-        total = np.zeros((len(omega), count, count), dtype=complex)
-        for part, own in zip(self.members, self.point_indices, strict=True):
-            total[:, own[:, None], own] = part.flexibility(omega)
-        return total
-
-    @cached_property
-    def force_rows(self) -> FloatArray:
-        """Force of the places that stand on the ground per force of the contacts."""
-        _, contacts = self._own_rows(
-            lambda part: part.rows[part.places[1]].T[:len(part.mean)])
-        return contacts
-
-    @cached_property
-    def place_rows(self) -> FloatArray:
-        """Motion of the places per motion of contacts and probes."""
-        probes, contacts = self._own_rows(lambda part: part.mean)
-        return np.asarray(scipy.linalg.block_diag(contacts, np.eye(probes)))
-
-    def _own_rows(
-        self, whole: Callable[[FoundationPart], FloatArray],
-    ) -> tuple[int, FloatArray]:
-        """Return how many probes there are, and what of each whole contact and patch is told."""
-        wholes = scipy.linalg.block_diag(
-            np.zeros((0, 0)), *(whole(part) for part in self.members))
-        patched = np.concatenate([np.zeros(0, dtype=bool), *(
-            np.full(len(part.contacts), part.is_patched) for part in self.members)])
-        probes = sum(len(part.probes) for part in self.members)
-        return probes, np.concatenate([wholes, np.eye(self.contacts)[patched]])
-
-    @cached_property
-    def block_mass(self) -> FloatArray:
-        """Mass matrix of the rigid motion of all foundations, (6 f, 6 f)."""
-        return np.asarray(scipy.linalg.block_diag(
-            np.zeros((0, 0)), *(part.mass for part in self.members)))
-
-    @property
-    def block_rows(self) -> FloatArray:
-        """
-        Seat motion per unit rigid motion of all foundations, (2 b, 6 f).
-
-        References
-        ----------
-        The matrix T of the congruence X_B = T q, which needs no inverse of the flexibility
-        of the seed paper's eq. (7): with three collinear bearings that one is singular.
-
-        """
-        return self.point_rows[:2 * len(self.bearings)]
-
-    @cached_property
-    def seat_pairs(self) -> FloatArray:
-        """Products of the motion of two seats per unit motion of the blocks, (6 f, 6 f, 4 b^2)."""
-        pairs = np.einsum('pi,qj->ijpq', self.block_rows, self.block_rows)
-        return np.asarray(pairs.reshape(*pairs.shape[:2], math.prod(pairs.shape[2:])))
 
     @cached_property
     def pedestal_axes(self) -> list[int]:
@@ -266,25 +92,54 @@ class Support:
 
     def standing(self, omega: FloatArray) -> Standing:
         """Return how the support answers forces at frequencies (n,) [rad/s]."""
-        below: Below = OnBodies(self, omega) if self.bends else OnBlocks(
+        below: Below = OnBodies(self, omega) if self.bends or self.is_stacked else OnBlocks(
             self, omega, BlockReceptance.of(self.ground(omega), self.block_mass, omega))
         return Standing(self, omega, below, self.pedestals(omega) + below.seats)
 
     @cached_property
-    def motions(self) -> tuple[IntArray, ...]:
-        """Which motions of the support are those of each part: contacts, elastic coordinates."""
-        contact, elastic = 0, self.contacts + len(self.pedestal_axes)
-        found = []
-        for part in self.members:
-            more = len(part.on_contacts.mass) - len(part.contacts)
-            found.append(np.array([*range(contact, contact + len(part.contacts)),
-                                   *range(elastic, elastic + more)], dtype=int))
-            contact, elastic = contact + len(part.contacts), elastic + more
-        return tuple(found)
+    def turns(self) -> tuple[FloatArray, ...]:
+        """
+        Contacts and elastic coordinates of each part per motion of the support, (own, s).
+
+        What stands on a foundation moves with it; then all springs together are those of a free
+        body again: none between contacts and elastic coordinates, a unit one for each of these.
+        """
+        if not self.members:
+            return ()
+        contacts = np.split(np.arange(self.contacts), np.cumsum(
+            [len(part.contacts) for part in self.members], dtype=int)[:-1])
+        counts = [len(part.on_contacts.mass) - len(part.contacts) for part in self.members]
+        first, size = self.contacts + len(self.pedestal_axes), self._size
+        elastic = np.split(np.arange(first, size), np.cumsum(counts, dtype=int)[:-1])
+        found = [np.eye(size)[np.append(*own)] for own in zip(contacts, elastic, strict=True)]
+        for below in self._from_below:
+            places = self.members[below].on_contacts.rows[self.members[below].places[3]]
+            moved = places @ found[below]
+            for index in self.above[below]:
+                count = len(contacts[index])
+                found[index][:count] += moved[:count]
+                moved = moved[count:]
+        if not self.is_stacked:
+            return tuple(found)
+        springs = sum((turn.T @ part.on_contacts.spring.real @ turn for part, turn in zip(
+            self.members, found, strict=True)), np.zeros((size, size)))
+        held, unit = springs[first:, first:], np.eye(size)
+        unit[first:, :first] = -np.linalg.solve(held, springs[first:, :first])
+        unit[first:, first:] = np.linalg.inv(np.linalg.cholesky(held)).T
+        return tuple(turn @ unit for turn in found)
 
     @property
+    def _from_below(self) -> list[int]:
+        """Foundations that carry others, each behind that on which it stands."""
+        order = [index for index, one in enumerate(self.foundations) if one.on is None]
+        for index in order:
+            order += self.above[index]
+        return [index for index in order if self.above[index]]
+
+    @cached_property
     def _size(self) -> int:
-        return len(self.pedestal_axes) + sum(map(len, self.motions))
+        return len(self.pedestal_axes) + sum(
+            len(part.on_contacts.mass) for part in self.members)
 
     @property
     def elastic(self) -> int:
@@ -295,9 +150,9 @@ class Support:
     def point_motion(self) -> FloatArray:
         """Motion of seats, contacts and probes per motion of the support, (p, s)."""
         rows = np.zeros((len(self.point_rows), self._size))
-        for part, points, own in zip(
-                self.members, self.point_indices, self.motions, strict=True):
-            rows[points[:, None], own] = part.on_contacts.rows
+        for part, points, turn in zip(
+                self.members, self.point_indices, self.turns, strict=True):
+            rows[points] = part.on_contacts.rows @ turn
         return rows
 
     @cached_property
@@ -318,17 +173,22 @@ class Support:
         """Mass matrix of the motion of the support, (s, s)."""
         rows = self.motion_rows
         total = np.asarray(rows.T @ self.housing_mass @ rows)
-        for part, own in zip(self.members, self.motions, strict=True):
-            total[own[:, None], own] += part.on_contacts.mass
+        for part, turn in zip(self.members, self.turns, strict=True):
+            total += turn.T @ part.on_contacts.mass @ turn
         return total
+
+    @cached_property
+    def bent_springs(self) -> tuple[ComplexArray, ...]:
+        """Stiffness of each foundation over the motion of the support, (s, s)."""
+        return tuple(turn.T @ part.on_contacts.spring @ turn
+                     for part, turn in zip(self.members, self.turns, strict=True))
 
     @cached_property
     def motion_spring(self) -> ComplexArray:
         """Stiffness of the motion of the support beside its compliance, (s, s): of what bends."""
-        total = np.zeros((self._size, self._size), dtype=complex)
-        for part, own in zip(self.members, self.motions, strict=True):
-            total[own[:, None], own] += part.on_contacts.spring
-        return total
+        # The elastic coordinates' own unit springs belong to the compliance.
+        units = np.arange(self._size) >= self._size - self.elastic
+        return np.asarray(sum(self.bent_springs, -np.diag(units.astype(complex))))
 
     def motion_compliance(self, omega: FloatArray) -> ComplexArray:
         """Return the compliance of soils and pedestals without mass, (n, c, c)."""

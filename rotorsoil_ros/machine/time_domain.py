@@ -88,8 +88,10 @@ def shake(
             np.any(values(bearing.inertia)) for bearing in model.rotor.bearings):
         raise RotorSoilError('integration in time knows no damping of and no torque in the shaft, '
                              'no inertia of bearings and no tables over frequency')
-    if model.support.bends:
-        raise RotorSoilError('integration in time knows no foundation that bends')
+    support = model.support
+    if support.bends or support.is_stacked or support.table is not None:
+        raise RotorSoilError('integration in time knows rigid blocks on the ground only, no '
+                             'foundation that bends or stands on another and no table of seats')
     system = _System(model, speed)
     step = float(time[1] - time[0])
     rate = np.gradient(speed, time)

@@ -179,7 +179,8 @@ class Picture:
         sizes = [(2.0 * part.half_width, 2.0 * part.half_length, block.height) for part in parts]
         centres = [(part.x, part.y, 0.5 * block.height) for part in parts]
         # What is static hides what moves: the block stands here and moves one level below.
-        log(block.name, rr.Transform3D(translation=(block.centre_x, block.centre_y, 0.0)))
+        log(block.name, rr.Transform3D(translation=(
+            block.centre_x, block.centre_y, block.elevation)))
         if block.hole:
             log(f'{block.name}/ground', rr.LineStrips3D(
                 block.hole, colors=EARTH, radii=EDGE_RADIUS))

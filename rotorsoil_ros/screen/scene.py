@@ -55,7 +55,7 @@ class Block:
     A drawn foundation: half-sizes, height, centre, legs of its bearings [m], its six channels.
 
     It is schematic where its case does not tell its height. `embedment` is how deep its base lies
-    below the surface [m].
+    below the surface, `elevation` how high it stands on others [m].
     """
 
     name: str
@@ -69,6 +69,7 @@ class Block:
     is_schematic: bool
     embedment: float = 0.0
     parts: tuple[Part, ...] = ()
+    elevation: float = 0.0
 
     @property
     def hole(self) -> list[list[tuple[float, float, float]]]:
@@ -266,15 +267,16 @@ def _block(
     foundation: Foundation, case: Case, index: Mapping[Channel, int], depth: float,
 ) -> Block:
     width, length = (0.5 * (last - first) for first, last in extents(foundation.contact))
-    centre = np.array([foundation.centre_x, foundation.centre_y, 0.0])
-    height = foundation.height or BLOCK_SHARE * case.rotor.shaft_height
-    legs = tuple(_leg(rotor, place, bearing.position, height) - centre
+    foot = foundation.elevation
+    centre = np.array([foundation.centre_x, foundation.centre_y, foot])
+    height = foundation.height or BLOCK_SHARE * (case.rotor.shaft_height - foot)
+    legs = tuple(_leg(rotor, place, bearing.position, foot + height) - centre
                  for _, rotor, place in placed(case) for bearing in rotor.bearings
                  if bearing.foundation == foundation.name)
     parts = () if isinstance(foundation.contact, Circle) else parts_of(foundation.contact)
     return Block(foundation.name, width, length, height, foundation.centre_x, foundation.centre_y,
                  legs, tuple(index[Channel(foundation.name, '', dof)] for dof in DOFS),
-                 foundation.height is None, depth, parts)
+                 foundation.height is None, depth, parts, foot)
 
 
 def _bending(stations: Sequence[float], y: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from rotorsoil_ros.case.design.tables import (
 from rotorsoil_ros.case.entries.sensors import site_around
 from rotorsoil_ros.case.entries.site import BOUNDARY_ELEMENTS, site_of
 from rotorsoil_ros.case.entries.support_file import RECEPTANCE, TABLE
-from rotorsoil_ros.case.flexible.ground import bed_of, discs
+from rotorsoil_ros.case.flexible.ground import bed_of, discs, welded
 from rotorsoil_ros.errors import InputError, RotorSoilError
 from rotorsoil_ros.ground.bed import PatchesApart, WinklerBed
 from rotorsoil_ros.ground.boundary.layered_model import LayeredSiteModel
@@ -49,6 +49,8 @@ def soil_models(case: Case, cache: Cache) -> tuple[SoilModel, ...]:
 
 def _soil_model(case: Case, index: int, cache: Cache) -> SoilModel:
     block = case.foundations[index]
+    if block.on is not None:
+        return welded(block)
     if block.body is None:
         return _below(case, index, block.contact, cache)
     if block.body.bed == GROUNDED:

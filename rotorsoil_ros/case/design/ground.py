@@ -64,6 +64,8 @@ def model_error(case: Case, foundation: Foundation, shape: ShapeError | None) ->
 
     """
     support, contact = case.support.model, foundation.contact
+    if foundation.on is not None:
+        return ''
     if bed := bed_error(foundation):
         return bed
     if support == BOUNDARY_ELEMENTS:
@@ -145,8 +147,9 @@ def of_site(case: Case, soil_models: Sequence[SoilModel]) -> Iterator[tuple[str,
     found = np.abs(soil_models[0].compliance(np.array([case.speed_range[1]]))[0])
     own = np.sqrt(np.diagonal(found))
     share = found / np.outer(own, own)
-    for second, other in enumerate(case.foundations):
-        for first, block in enumerate(case.foundations[:second]):
+    grounded = [block for block in case.foundations if block.on is None]
+    for second, other in enumerate(grounded):
+        for first, block in enumerate(grounded[:second]):
             between = share[6 * first:6 * first + 6, 6 * second:6 * second + 6]
             row, column = np.unravel_index(between.argmax(), between.shape)
             yield f'{block.name} and {other.name}: coupled through the ground', (
@@ -162,6 +165,8 @@ def of_neighbours(case: Case) -> Iterator[str]:
         return
     for second, block in enumerate(case.foundations):
         for other in case.foundations[:second]:
+            if block.on is not None or other.on is not None:
+                continue
             apart = other.centre_x - block.centre_x, other.centre_y - block.centre_y
             coupling, change = neglected_coupling(block.contact, other.contact, apart=apart)
             clear = gap(block.contact, other.contact, apart=apart)
@@ -196,6 +201,8 @@ def _other_forms_of(case: Case) -> str:
     """Return which ground the band holds beside that of the case."""
     if any(block.body is not None for block in case.foundations):
         return 'not the error of the ground below patches'
+    if any(block.on is not None for block in case.foundations):
+        return 'not the error of the models'
     if case.support.model not in ('cone', 'infinite_elements') or case.soil is None:
         return ''
     if any(embedment.depth for embedment in case.embedments):

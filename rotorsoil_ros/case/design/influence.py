@@ -159,6 +159,8 @@ def on_larger_blocks(case: Case, directory: Path, factor: float) -> CoupledModel
         raise RotorSoilError('the support is rigid' if case.support.model == 'rigid' else
                              'the file of the support knows this one only')
     for block in case.foundations:
+        if block.on is not None:
+            raise RotorSoilError(f'{block.name} stands on {block.on.foundation}')
         if block.body is not None:
             raise RotorSoilError(f'{block.name} bends, and its file tells of this size only')
     blocks = tuple(_larger(block, factor) for block in case.foundations)

@@ -4,14 +4,14 @@ from collections.abc import Iterator, Sequence
 import math
 
 from rotorsoil_ros.case.config import Case
-from rotorsoil_ros.ground.soil import below_each, SoilModel
+from rotorsoil_ros.ground.soil import SoilModel
 from rotorsoil_ros.machine.flexible.rigidity import (
     ABOVE_EXCITATION,
     ABOVE_HEAVE,
     Rigidity,
     rigidity,
 )
-from rotorsoil_ros.machine.foundation import Foundation
+from rotorsoil_ros.machine.foundation import Foundation, soils_below
 from rotorsoil_ros.units import rad_s_to_hz
 
 # Shares by which a block that bends was off at most, up to so much of its first bending.
@@ -23,7 +23,7 @@ def rigidities(
     case: Case, soil_models: Sequence[SoilModel],
 ) -> Iterator[tuple[int, Foundation, Rigidity]]:
     """Yield how rigid each block is that could bend, and its place among the foundations."""
-    below = below_each(soil_models, len(case.foundations))
+    below = soils_below(case.foundations, soil_models)
     for index, (block, ground) in enumerate(zip(case.foundations, below, strict=True)):
         if block.body is not None:
             continue

@@ -57,7 +57,8 @@ def shape_errors(
             return _shape_error(case, soil, index, block, model, cache)
         return None
 
-    return tuple(None if block.body is not None else error(index, block, model)
+    return tuple(None if block.body is not None or block.on is not None else error(
+        index, block, model)
                  for index, (block, model) in enumerate(
         zip(case.foundations, soil_models, strict=True)))
 
@@ -107,7 +108,7 @@ def other_forms(
 ) -> tuple[list[SoilModel], list[float]]:
     """Return what the ground below each block may be instead, and how much stiffer."""
     stiffer = [0.0] * len(case.foundations)
-    bends = any(block.body is not None for block in case.foundations)
+    bends = any(block.body is not None or block.on is not None for block in case.foundations)
     if not spread.model_form or case.soil is None or bends or not _takes_discs(case):
         return [], stiffer
     if case.support.model == THIN_LAYERS:

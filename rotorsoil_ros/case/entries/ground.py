@@ -204,7 +204,8 @@ class GroundEntries:
                 raise self.faults.error('uncertainty', 'rock_depth', problem=(
                     f'must not be given where green couples the patches of {block.name} '
                     f'(foundations.{index}) through a half-space'))
-            if model == BOUNDARY_ELEMENTS and len(entries.foundations) > 1:
+            if model == BOUNDARY_ELEMENTS and sum(
+                    one.on is None for one in entries.foundations) > 1:
                 raise self.faults.error('support', 'model', problem=(
                     f'must be one that takes each foundation alone where {block.name} bends '
                     f'(foundations.{index}), got {model}, which couples rigid blocks'))

@@ -145,6 +145,7 @@ def _on_ground(
 ) -> tuple[GroundSensor, ...] | None:
     """Return the sensors on the ground, or None where one is at fault."""
     entries = faults.entries.ground
+    foundations = [block for block in foundations if block.on is None]
     blocks = {block.name: block for block in foundations}
 
     def of() -> str:
@@ -192,8 +193,9 @@ def site_around(
         If a place is not beside the blocks, or blocks overlap.
 
     """
-    return Site.of(tuple(_with_corners(block.contact) for block in foundations),
-                   tuple((block.centre_x, block.centre_y) for block in foundations),
+    grounded = [block for block in foundations if block.on is None]
+    return Site.of(tuple(_with_corners(block.contact) for block in grounded),
+                   tuple((block.centre_x, block.centre_y) for block in grounded),
                    tuple(places))
 
 

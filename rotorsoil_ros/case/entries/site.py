@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rotorsoil_ros.case.case_errors import Faults
@@ -52,8 +52,9 @@ def site_of(foundations: Sequence[Foundation], probes: Sequence[GroundProbe] = (
         If a contact is a circle or a probe is not beside the blocks.
 
     """
-    return Site.of(tuple(block.contact for block in foundations),
-                   tuple((block.centre_x, block.centre_y) for block in foundations),
+    grounded = [block for block in foundations if block.on is None]
+    return Site.of(tuple(block.contact for block in grounded),
+                   tuple((block.centre_x, block.centre_y) for block in grounded),
                    tuple((probe.x, probe.y) for probe in probes))
 
 
@@ -117,7 +118,7 @@ class SiteEntries:
             return
         for index, block in enumerate(case.foundations):
             with faults.at('foundations', index):
-                site_of([block])
+                site_of([replace(block, on=None)])
         for index, probe in enumerate(case.ground_probes):
             with faults.at('ground', 'probes', index):
                 site_of(case.foundations, [probe])

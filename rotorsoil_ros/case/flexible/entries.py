@@ -1,5 +1,6 @@
 """Which foundation that bends the entries of a case file describe, and what is refused of it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 import hashlib
 import json
@@ -14,6 +15,7 @@ from rotorsoil_ros.case import schema
 from rotorsoil_ros.case.cache import Cache, content_key
 from rotorsoil_ros.case.case_errors import Faults
 from rotorsoil_ros.case.flexible.files import Loss, of_matrices, of_modes
+from rotorsoil_ros.case.flexible.stacking import StackEntries
 from rotorsoil_ros.channel import ACROSS, DOFS
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.soil import Circle, Contact, Rectangle
@@ -60,8 +62,10 @@ class FlexibleEntries:
     speed: float
     cache: Cache
 
-    def foundation(self, index: int, entry: schema.FoundationEntry) -> Foundation:
-        """Return one foundation, or raise an InputError."""
+    def foundation(
+        self, index: int, entry: schema.FoundationEntry, below: Mapping[str, Foundation],
+    ) -> Foundation:
+        """Return one foundation on the ground or on those below, or raise an InputError."""
         flexible = entry.flexible
         assert flexible is not None
         given = next((key for key in _OWN if key in entry.model_fields_set
@@ -73,17 +77,19 @@ class FlexibleEntries:
         with self.faults.at('foundations', index, 'flexible', entry=flexible):
             body = self._on_ground(index, entry, body)
             self._refuse_few_modes(index, flexible, body)
-        x, y = self._centre(index, entry, body)
         mass = body.mass_about_centre
         height = float(mass[0, 4] / mass[0, 0])
         moments = mass.diagonal()[3:] - mass[0, 0] * np.array([height**2, height**2, 0.0])
         about_x, about_y, about_z = np.maximum(moments, 0.0).tolist()
         with self.faults.at('foundations', index, entry=entry):
-            return Foundation(
-                name=entry.name, contact=_outline(entry, body), centre_x=x, centre_y=y,
-                mass=float(mass[0, 0]), centre_of_gravity_height=height,
-                inertia=(about_x, about_y, about_z), body=body,
+            alone = Foundation(
+                name=entry.name, contact=_outline(entry, body), centre_x=entry.centre_x,
+                centre_y=entry.centre_y or 0.0, mass=float(mass[0, 0]),
+                centre_of_gravity_height=height, inertia=(about_x, about_y, about_z), body=body,
                 height=_drawn_height(body) if entry.height is None else entry.height)
+        block = StackEntries(self.faults).stood(index, entry, alone, below)
+        x, y = self._centre(entry, body, block)
+        return replace(block, centre_x=x, centre_y=y)
 
     def _body(self, index: int, name: str, entry: schema.FlexibleEntry) -> FlexibleBody:
         """Return the body: as it came with the document, out of the cache, or from its files."""
@@ -173,6 +179,9 @@ class FlexibleEntries:
             raise self.faults.error(*place, 'flexible', 'dofs', problem=(
                 'must have motions of kind contact, where the ground is'))
         if entry.flexible.grounded:
+            if entry.on is not None:
+                raise self.faults.error(*place, 'on', problem=(
+                    'must not be given of a body that is grounded, which stands on firm ground'))
             return body
         rank = np.linalg.matrix_rank(body.about_centre[body.contacts])
         if rank < len(DOFS):
@@ -180,6 +189,8 @@ class FlexibleEntries:
                 'must have contacts that hold all six rigid motions, '
                 f'got {rank}' + ('; one contact needs x, y, z, rx, ry, rz'
                                  if body.has_one_contact else '')))
+        if entry.on is not None:
+            return body if body.has_one_contact else self._patched(body, EACH)
         if body.has_one_contact:
             self._refuse_soft_contact(index, entry.flexible, body)
             if under is not None:
@@ -229,18 +240,18 @@ class FlexibleEntries:
                 f'got {rad_s_to_hz(body.reach):.4g} Hz'))
 
     def _centre(
-        self, index: int, entry: schema.FoundationEntry, body: FlexibleBody,
+        self, entry: schema.FoundationEntry, body: FlexibleBody, block: Foundation,
     ) -> tuple[float, float]:
         """Return where the contact is beside the shaft, after all seats were found on it."""
-        x, y = entry.centre_x, entry.centre_y
         if self.faults.under:
             # Among several machines seats bear their names, and places are those of the ground.
-            return x, y or 0.0
-        seats = self._seats(entry, body)
-        mean = np.nanmean(np.array([gap for _, gap in seats] or [np.zeros(3)]), axis=0)
-        if 'centre_x' not in entry.model_fields_set:
-            x = float(mean[0])
-        y = float(mean[1]) if y is None else y
+            return block.centre_x, block.centre_y
+        x, y, seats = block.centre_x, block.centre_y, self._seats(entry, body, block.elevation)
+        # Without a seat its own axes are those of the ground.
+        mean = np.nanmean(np.array([gap for _, gap in seats] or [np.array(body.centre)]), axis=0)
+        if block.on is None or not block.on.places:
+            x = x if 'centre_x' in entry.model_fields_set else float(mean[0])
+            y = float(mean[1]) if entry.centre_y is None else y
         for number, gap in seats:
             bearing = self.faults.entries.rotor.bearings[number]
             with self.faults.at('rotor', 'bearings', number, entry=bearing):
@@ -248,12 +259,13 @@ class FlexibleEntries:
         return x, y
 
     def _seats(
-        self, entry: schema.FoundationEntry, body: FlexibleBody,
+        self, entry: schema.FoundationEntry, body: FlexibleBody, elevation: float,
     ) -> list[tuple[int, FloatArray]]:
         """Return which bearings stand on a body, each with the way from its seat to it, (3,)."""
         entries = self.faults.entries
         upright = entries.rotor.orientation == 'vertical'
-        height, across = entries.rotor.shaft_height, ('x', 'y') if upright else ACROSS
+        height = entries.rotor.shaft_height - elevation
+        across = ('x', 'y') if upright else ACROSS
         own = {entry.name, None} if len(entries.foundations) == 1 else {entry.name}
         found = []
         for number, bearing in enumerate(entries.rotor.bearings):

@@ -9,7 +9,7 @@ from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.bed import PatchesApart, WinklerBed
-from rotorsoil_ros.ground.soil import Contact, Rectangle, SoilModel
+from rotorsoil_ros.ground.soil import Contact, Rectangle, RigidSoil, SoilModel
 from rotorsoil_ros.machine.flexible.body import Dof, FlexibleBody, GREEN, WINKLER
 from rotorsoil_ros.machine.foundation import Foundation
 
@@ -49,6 +49,11 @@ def bed_of(
     contacts = [contact_of(patch, foundation) for patch in body.patches]
     models = {contact: under(contact) for contact in dict.fromkeys(contacts)}
     return PatchesApart(tuple(models[contact] for contact in contacts), kept, rows)
+
+
+def welded(foundation: Foundation) -> SoilModel:
+    """Return what is between a foundation and that on which it stands: nothing that gives."""
+    return bed_of(foundation, lambda _: RigidSoil(), lambda _: RigidSoil())
 
 
 def _shares(body: FlexibleBody) -> FloatArray:

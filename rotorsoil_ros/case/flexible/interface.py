@@ -14,7 +14,7 @@ from rotorsoil_ros.case.entries.cells import at_once
 from rotorsoil_ros.case.flexible.tables import Row
 from rotorsoil_ros.channel import DOFS
 from rotorsoil_ros.errors import InputError
-from rotorsoil_ros.machine.flexible.body import CONTACT, Dof
+from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, SEAT
 from rotorsoil_ros.machine.flexible.reduction import Sparse
 
 # Places nearer than this are one [m].
@@ -160,7 +160,8 @@ class _Found:
                              'turns')
         motions = np.eye(3) if follows is None else follows
         whole = sum(row.dof.area for row in nodes)
-        axes = DOFS[:len(motions)] if group[0].dof.kind == CONTACT else DOFS[:3]
+        # Bearings ask a seat how it moves; what stands on another place, or is asked for, turns.
+        axes = DOFS[:3] if group[0].dof.kind == SEAT else DOFS[:len(motions)]
         for axis, motion in zip(axes, motions, strict=False):
             pick = np.zeros(self.size)
             pick[indices] = motion

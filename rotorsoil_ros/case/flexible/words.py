@@ -53,7 +53,7 @@ def _told(block: Foundation, body: FlexibleBody) -> Iterator[tuple[str, str]]:
         + ('its base is held' if body.bed == GROUNDED else 'nothing holds it')
         + f'; {len(hertz)} modes up to {hertz.max(initial=0.0):.4g} Hz and what they leave out, '
         + f'loss factor {body.residual_loss:g}')
-    if body.bed != GROUNDED:
+    if body.bed != GROUNDED and block.on is None:
         how = {'winkler': 'a Winkler bed', 'green': 'one half-space',
                'each': 'ground of their own'}.get(body.bed, 'the ground')
         yield f'{name}: stands on', (

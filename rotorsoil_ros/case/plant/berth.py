@@ -197,5 +197,6 @@ def refuse_seats_elsewhere(
         mount, body = Mount(bearing, rotor.shaft_height, place), block.body
         with faults.at('rotor', 'bearings', number, entry=faults.entries.rotor.bearings[number]):
             seat = body.dofs[int(np.flatnonzero(mount.on(body)[1])[0])]
-            below = np.array(seat.place) - body.centre + [block.centre_x, block.centre_y, 0.0]
+            below = np.array(seat.place) - body.centre + [
+                block.centre_x, block.centre_y, block.elevation]
             require_on_shaft(seat.station, np.array(mount.point) - below)

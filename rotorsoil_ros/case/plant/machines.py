@@ -391,4 +391,6 @@ def _place(machine: MachineEntry, rotor: Rotor) -> Placement:
 
 def _centred(entry: FoundationEntry) -> FoundationEntry:
     """Return a block that is where the axes begin, unless it says where it is."""
-    return entry if entry.centre_y is not None else entry.model_copy(update={'centre_y': 0.0})
+    placed = entry.centre_y is not None or (
+        entry.on is not None and bool(entry.on.place or entry.on.places))
+    return entry if placed else entry.model_copy(update={'centre_y': 0.0})

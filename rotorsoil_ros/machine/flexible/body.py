@@ -160,6 +160,26 @@ class FlexibleBody:
                                  f'{", ".join(seats) or "there is none"}, got {station}')
         return found
 
+    def motion(self, station: str, axis: str) -> FloatArray:
+        """
+        Return which of its motions is that of a place along or about an axis, (p,).
+
+        Raises
+        ------
+        RotorSoilError
+            If it has no such motion.
+
+        """
+        found = [index for index, dof in enumerate(self.dofs)
+                 if (dof.station, dof.axis) == (station, axis)]
+        if not found:
+            own = ', '.join(dof.axis for dof in self.dofs if dof.station == station)
+            known = ', '.join(dict.fromkeys(dof.station for dof in self.dofs))
+            raise RotorSoilError(
+                f'place must move along {axis}, {station} has {own}' if own else
+                f'place must be one of {known}, got {station}')
+        return np.asarray(np.eye(len(self.dofs))[found[0]])
+
     @cached_property
     def contacts(self) -> IntArray:
         """Motions that the ground resists, those of one place together, x before rz."""

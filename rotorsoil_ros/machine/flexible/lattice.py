@@ -133,7 +133,7 @@ def _stations(body: FlexibleBody) -> set[str]:
 def _places(block: Foundation, body: FlexibleBody) -> dict[str, list[float]]:
     """Return where its places are in the axes of the ground [m]."""
     # The middle of its contact stands where the foundation does.
-    shift = np.array([block.centre_x, block.centre_y, 0.0]) - body.centre
+    shift = np.array([block.centre_x, block.centre_y, block.elevation]) - body.centre
     return {dof.station: (np.array(dof.place) + shift).tolist() for dof in body.dofs}
 
 

@@ -77,7 +77,7 @@ class Mount:
 @dataclass(frozen=True)
 class FoundationPart:
     """
-    One foundation by its points: seats, then contacts, then probes.
+    One foundation by its points: seats, contacts, probes, then what stands on it.
 
     Attributes
     ----------
@@ -87,6 +87,8 @@ class FoundationPart:
         Its contacts, six of a block.
     probes : tuple of Channel
         Other motions that are asked for.
+    carried : int
+        How many motions of contacts of other foundations stand on it.
     mass : (6, 6) float array
         Of the rigid body about the middle of its contact; of a table none, over its motions.
     rows : (p, 6) float array
@@ -107,6 +109,7 @@ class FoundationPart:
     seats: tuple[int, ...]
     contacts: tuple[Channel, ...]
     probes: tuple[Channel, ...]
+    carried: int
     mass: FloatArray
     rows: FloatArray
     shapes: FloatArray
@@ -117,36 +120,44 @@ class FoundationPart:
     mean: FloatArray
 
     @classmethod
-    def of(cls, foundation: Foundation, mounts: Sequence['Mount']) -> 'FoundationPart':
-        """Return what a foundation is to bearings, those that stand on it among them."""
+    def of(
+        cls, foundation: Foundation, mounts: Sequence['Mount'], others: Sequence[Foundation],
+    ) -> 'FoundationPart':
+        """Return what one is to bearings and foundations, those that stand on it among them."""
         own = [index for index, mount in enumerate(mounts)
                if mount.bearing.foundation == foundation.name]
         seats = tuple(2 * index + axis for index in own for axis in range(2))
         on_it = [mounts[index] for index in own]
+        above = [foundation.under(other) for other in others
+                 if other.on is not None and other.on.foundation == foundation.name]
         if foundation.body is not None:
-            return cls._flexible(foundation.name, foundation.body, seats, on_it)
-        rows = [foundation.seat_rows(position=mount.bearing.position, height=mount.height,
-                                     place=mount.place) for mount in on_it]
+            return cls._flexible(foundation.name, foundation.body, seats, on_it, above)
+        rows = [foundation.seat_rows(
+            position=mount.bearing.position, height=mount.height - foundation.elevation,
+            place=mount.place) for mount in on_it]
         six = tuple(Channel(foundation.name, '', dof) for dof in DOFS)
-        points = np.concatenate([*rows, np.eye(6)])
-        count = len(points)
-        return cls(seats, six, (), foundation.mass_matrix, points, np.zeros((count, 0)),
+        points = np.concatenate([*rows, np.eye(6), *above])
+        count, carried = len(points), sum(map(len, above))
+        return cls(seats, six, (), carried, foundation.mass_matrix, points, np.zeros((count, 0)),
                    np.zeros(0, dtype=complex), np.zeros((count, count), dtype=complex),
                    np.zeros((count, 0)), 0.0, np.eye(6))
 
     @classmethod
     def _flexible(
         cls, name: str, body: FlexibleBody, seats: tuple[int, ...], mounts: Sequence['Mount'],
+        above: Sequence[FloatArray],
     ) -> 'FoundationPart':
         contacts, probes = body.channels(name)
         rows = [*body.contacts.tolist(), *body.of_kind(PROBE)]
         picked = np.concatenate([*(mount.on(body) for mount in mounts),
-                                 np.eye(len(body.dofs))[rows]])
+                                 np.eye(len(body.dofs))[rows], *above])
+        carried = sum(map(len, above))
         residual = picked @ body.residual @ picked.T
         # What no force acts on needs no shape of its own: it follows those of the others.
-        loaded = slice(0, len(picked) - len(probes))
-        springs = massless(residual[loaded, loaded], picked[loaded] @ body.static_size)
-        return cls(seats, contacts, probes, body.mass_about_centre,
+        silent = len(picked) - carried - len(probes) + np.arange(len(probes))
+        loaded = np.setdiff1d(np.arange(len(picked)), silent)
+        springs = massless(residual[loaded[:, None], loaded], picked[loaded] @ body.static_size)
+        return cls(seats, contacts, probes, carried, body.mass_about_centre,
                    picked @ body.about_centre, picked @ body.shapes,
                    np.asarray(body.stiffness * (1.0 + 1j * body.loss)),
                    np.asarray(residual / (1.0 + 1j * body.residual_loss)),
@@ -168,16 +179,17 @@ class FoundationPart:
                for row in table.rows_of(mount.bearing.seat or mount.bearing.name)]
         count = len(table.seats)
         points = np.concatenate([np.eye(count)[own], np.eye(count)])
-        return cls(tuple(range(len(own))), table.seats, (), np.zeros((count, count)), points,
+        return cls(tuple(range(len(own))), table.seats, (), 0, np.zeros((count, count)), points,
                    np.zeros((len(points), 0)), np.zeros(0, dtype=complex),
                    np.zeros((len(points),) * 2, dtype=complex), np.zeros((len(points), 0)), 0.0,
                    np.zeros((0, count)))
 
     @property
-    def places(self) -> tuple[slice, slice, slice]:
-        """Where among the points seats, contacts and probes are."""
+    def places(self) -> tuple[slice, slice, slice, slice]:
+        """Where among the points seats, contacts, probes and what stands on it are."""
         first, second = len(self.seats), len(self.seats) + len(self.contacts)
-        return slice(0, first), slice(first, second), slice(second, None)
+        third = second + len(self.probes)
+        return (slice(0, first), slice(first, second), slice(second, third), slice(third, None))
 
     @property
     def is_patched(self) -> bool:
@@ -210,7 +222,7 @@ class FoundationPart:
             If forces at its contacts could not be told apart.
 
         """
-        _, contact, _ = self.places
+        _, contact, _, _ = self.places
         elastic = np.concatenate([self.shapes / np.sqrt(self.stiffness.real), self.massless],
                                  axis=1)
         loss = np.concatenate([self.stiffness.imag / self.stiffness.real,
@@ -221,10 +233,7 @@ class FoundationPart:
                 if self.is_patched else _free_on_one(self.rows[contact], elastic[contact]))
         mass = turn.T @ scipy.linalg.block_diag(self.mass, np.diag(inertia)) @ turn
         part = turn[len(self.mass):]
-        own = len(self.contacts)
         spring = part.T @ ((1.0 + 1j * loss)[:, None] * part)
-        # The elastic coordinates' own unit springs belong to the compliance.
-        spring[range(own, len(spring)), range(own, len(spring))] -= 1.0
         return ContactForm(mass, spring, motion @ turn)
 
 
@@ -238,7 +247,7 @@ class ContactForm:
     mass : (c + e, c + e) float array
         Mass matrix.
     spring : (c + e, c + e) complex array
-        Stiffness beyond the unit springs, with what it loses.
+        Stiffness, the unit springs among it, with what it loses.
     rows : (p, c + e) float array
         Motion of the points.
 

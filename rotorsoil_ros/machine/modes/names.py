@@ -201,13 +201,10 @@ class ModeNames:
     def _in_foundations(self, support: ComplexArray) -> dict[str, float]:
         """Return the energy that each foundation stores by bending."""
         found, below = {}, self.model.support
-        for block, own in zip(self.model.foundations, below.motions, strict=False):
+        for block, spring in zip(self.model.foundations, below.bent_springs, strict=False):
             if block.body is not None:
-                part = support[own]
-                spring = below.motion_spring[np.ix_(own, own)].real
-                elastic = part[own >= below.contacts]
                 found[f'{block.name} bending'] = float(
-                    np.vdot(part, spring @ part).real + np.vdot(elastic, elastic).real)
+                    np.vdot(support, spring.real @ support).real)
         return found
 
     def _in_table(self, support: ComplexArray, frequency: float) -> dict[str, float]:
