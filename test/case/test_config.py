@@ -113,7 +113,7 @@ def test_probe_is_a_channel():
     ('rotor.discs=3', 'rotor.discs: must be a list, got 3'),
     ('support.model=cones',
      "support.model: must be 'rigid', 'cone', 'infinite_elements', 'boundary_elements', "
-     "'thin_layers' or 'table', got 'cones'; did you mean cone?"),
+     "'thin_layers', 'table' or 'receptance', got 'cones'; did you mean cone?"),
     ('foundations.0.inertia=[1, 2]', 'foundations.0.inertia.2: is missing'),
     ('foundations.0.inertia=[1, 2, 3, 4]',
      'foundations.0.inertia: has more entries than it should: [1, 2, 3, 4]'),

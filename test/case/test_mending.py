@@ -52,7 +52,8 @@ FAN = [
     (put('soil.loss_factor', 1.5), 'soil.loss_factor: must be in [0, 1), got 1.5'),
     (renamed('support', 'geometry', 'geometri'),
      'support.geometri: is not a known key; did you mean geometry?'),
-    (put('support.file', 'k.csv'), 'support.file: belongs to the support model table, got cone'),
+    (put('support.file', 'k.csv'),
+     'support.file: belongs to the support model table or receptance, got cone'),
     (put('foundations.0.half_width', -1.0),
      'foundations.0.half_width: must be > 0 m and finite, got -1'),
     (put('foundations.0.mass', -5.0), 'foundations.0.mass: must be >= 0 kg and finite, got -5'),
@@ -154,7 +155,7 @@ ON_LAYERS = [
     (put('soil.below', 'rocks'), "soil.below: must be 'rock', got 'rocks'; did you mean rock?"),
     (put('support.model', 'thin_layer'),
      "support.model: must be 'rigid', 'cone', 'infinite_elements', 'boundary_elements', "
-     "'thin_layers' or 'table', got 'thin_layer'; did you mean thin_layers?"),
+     "'thin_layers', 'table' or 'receptance', got 'thin_layer'; did you mean thin_layers?"),
     (put('foundations.0.half_width', 1.0),
      'foundations.0: needs either half_width and half_length, or parts, or radius, in m'),
     (put('foundations.0.side_contact', 1.5),
