@@ -15,9 +15,12 @@ _NOISE = 1e-4
 # passive: so an inverse exists even without any mass or static stiffness.
 _CENTRE = -0.1j
 
-# Modes within so many times the highest frequency from half of it are told one by one; others by
-# their sum there and how it changes.
+# Modes within so many times the highest frequency from half of it are told one by one; the sum
+# of others lies on a line between zero and that frequency.
 _MIDDLE, _KEPT = 0.5, 1.25
+
+# Share of the largest mass below which a motion has none.
+_MASSLESS = 1e-12
 
 # What hardly has a frequency of its own relative to the highest, as 1 / w: it has no memory.
 _INSTANT = 1e-9
@@ -94,18 +97,17 @@ class SupportModes:
         values, vectors = np.linalg.eig(spread[memory])
         driven, shape = np.linalg.solve(vectors, pushed[memory]), spread[:own] @ vectors
         w = centre + 1.0 / np.where(values == 0.0, np.inf, values)
-        middle = _MIDDLE * highest
         kept = np.abs(values) * highest > _INSTANT
-        kept &= np.abs(w - middle) < _KEPT * highest
+        kept &= np.abs(w - _MIDDLE * highest) < _KEPT * highest
         if fit is not compliance:  # what is of that fit alone is no guess
             kept[kept] = compliance.persists(w[kept])
         # (w - centre) / (1 - (w - centre) mu) = 1 / mu (1 / (1 - (w - centre) mu) - 1).
         slow = shape[:, kept] / values[kept]
-        gain = 1.0 / (1.0 - (middle - centre) * values[~kept])
-        rate = (shape[:, ~kept] * gain**2) @ driven[~kept]
-        others = (shape[:, ~kept] * ((middle - centre) * gain)) @ driven[~kept]
+        ends = np.array([0.0, highest])[:, None] - centre
+        gains = ends / (1.0 - ends * values[~kept])
+        low, high = (shape[:, ~kept] * gain @ driven[~kept] for gain in gains)
         return cls(w[kept], values[kept], centre, slow, driven[kept],
-                   pushed[:own] - slow @ driven[kept] + others - middle * rate, rate)
+                   pushed[:own] - slow @ driven[kept] + low, (high - low) / highest)
 
 
 def _states(
@@ -115,7 +117,8 @@ def _states(
     """
     Return A, B and F of (A - w B) y = F f, over motion, its rate and the states of the soil.
 
-    z = constant p + left xi, w xi = poles xi + right p, p = f + (w^2 M - K) z, w z = unit u.
+    z = constant p + left xi, w xi = poles xi + right p, p = f + (w^2 M - K) z, w z = unit u, the
+    rate u of what has mass alone.
     """
     soil = compliance.states(_NOISE).beside(np.ones(support.elastic) + 0j)
     size = np.append(compliance.size, np.ones(support.elastic))
@@ -124,15 +127,19 @@ def _states(
         mass = mass + rows.T @ carried @ rows
     spring = size[:, None] * support.motion_spring * size
     own, states, unit = len(mass), len(soil.poles), 0.5 * highest
-    a = np.zeros((2 * own + states,) * 2, dtype=complex)
+    # A rate of what has no mass would be a double eigenvalue with one vector.
+    heavy, axes = np.linalg.eigh(mass)
+    axes = axes[:, heavy > _MASSLESS * heavy.max(initial=0.0)]
+    rates, inertia = axes.shape[1], mass @ axes
+    a = np.zeros((own + rates + states,) * 2, dtype=complex)
     b = np.zeros_like(a)
-    motion, rate, state = slice(0, own), slice(own, 2 * own), slice(2 * own, None)
+    motion, rate, state = slice(0, own), slice(own, own + rates), slice(own + rates, None)
     a[motion, motion], a[motion, state] = np.eye(own) + soil.constant @ spring, -soil.left
-    b[motion, rate] = unit * soil.constant @ mass
-    a[rate, rate], b[rate, motion] = unit * np.eye(own), np.eye(own)
+    b[motion, rate] = unit * soil.constant @ inertia
+    a[rate, rate], b[rate, motion] = unit * np.eye(rates), axes.T
     a[state, motion], a[state, state] = -soil.right @ spring, np.diag(soil.poles)
-    b[state, rate], b[state, state] = -unit * soil.right @ mass, np.eye(states)
-    force = np.concatenate([soil.constant @ rows.T, np.zeros((own, len(rows))),
+    b[state, rate], b[state, state] = -unit * soil.right @ inertia, np.eye(states)
+    force = np.concatenate([soil.constant @ rows.T, np.zeros((rates, len(rows))),
                             -soil.right @ rows.T])
     return a, b, force
 
