@@ -53,7 +53,7 @@ def of_sensors(case: Case) -> Iterator[str]:
         width = 2.0 * _half(sensor, block)
         if _clear(sensor, block) < _NEAR * width:
             yield (f'{sensor.name}: stands {_clear(sensor, block):.3g} m beside {block.name}, '
-                   f'less than {_NEAR:g} of its widths: it feels the block more than the ground')
+                   f'less than {_NEAR:g} of its widths: so near the ground moves with the block')
         if case.soil is not None and case.support.model != 'rigid':
             yield from _of_waves(case, sensor, block)
 
@@ -75,7 +75,8 @@ def _of_waves(case: Case, sensor: GroundSensor, block: Foundation) -> Iterator[s
     if averaged < _AVERAGED:
         yield (f'{sensor.name}: the base of {block.name} averages waves along the line to it, of '
                f'{rad_s_to_hz(fastest):.3g} Hz to {averaged:.2g} of their vertical motion (rigid, '
-               'sin(w b / c) / (w b / c)), which is not taken off')
+               'sin(w b / c) / (w b / c)), which is not taken off'
+               + ('; what bends averages less' if block.body is not None else ''))
 
 
 def _block(case: Case, sensor: GroundSensor) -> Foundation | None:
