@@ -80,6 +80,8 @@ class Monitor:
         self._beside = tuple(others)
         if others:
             self.judge.stand_beside(others)
+        if others and self.ground is not None:
+            self.ground.stand_beside(others)
 
     def _listen(self, ground: MovingGround | None, judging: Judging | None) -> None:
         """Hear sensors on the ground, where there are any."""

@@ -21,6 +21,7 @@ from rotorsoil_ros.events import (
 )
 from rotorsoil_ros.machine.response import Predictor
 from rotorsoil_ros.machine.transmissibility import MovingGround
+from rotorsoil_ros.monitor.beside.companions import Companion, Companions
 from rotorsoil_ros.monitor.ground.account import GroundAccount, LATEST_VECTORS, MILLI
 from rotorsoil_ros.monitor.ground.broadband import Spectra
 from rotorsoil_ros.monitor.ground.sensor import SensorOnGround
@@ -66,12 +67,20 @@ class Attribution:
         self._weighed: deque[Weighed] = deque()
         self._known: dict[int, ComplexArray | None] = {}
         self._led_ns, self._second = -1, -1
-        self._sensors = judging.sensors
+        self._sensors, self._turns = judging.sensors, judging.turns
         self.spectra = Spectra(moving, tuple(self.sensors), history)
         self.account = GroundAccount(judging.rules, moving.table.channels, zones)
         self._strangers: set[str] = set()
         self._apart = deque[float](maxlen=LATEST_VECTORS)
         self._own: dict[str, deque[float]] = {}
+
+    def stand_beside(self, others: Sequence[Companion]) -> None:
+        """Tell what other machines do to the sensors from what the ground does."""
+        companions = Companions(self._history, others, turns=self._turns)
+        housings = [channel for channel in self.moving.table.channels if channel.is_housing]
+        for sensor in self.sensors.values():
+            sensor.companions, sensor.felt_most = companions, housings[0]
+        self.spectra.companions = companions
 
     def take(self, name: str, samples: Samples) -> None:
         """Keep samples of a sensor, as its messages have them."""

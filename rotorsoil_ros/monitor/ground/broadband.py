@@ -11,7 +11,9 @@ from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.channel import Channel
 from rotorsoil_ros.events import NANOSECONDS
 from rotorsoil_ros.machine.transmissibility import MovingGround
+from rotorsoil_ros.monitor.beside.companions import Companions
 from rotorsoil_ros.monitor.vectors.history import History
+from rotorsoil_ros.monitor.vectors.orders import SpeedTrack
 from rotorsoil_ros.units import hz_to_rad_s, rad_s_to_hz, rpm_to_rad_s
 
 # Samples are looked at by so many seconds, in segments that overlap by half.
@@ -114,6 +116,8 @@ class Spectra:
         self._lowest_hz = _LOWEST_HZ
         self._looked, self._rows = 0, list[Broadband]()
         self._begin_ns = 0
+        # Who runs beside the machine, where it is known.
+        self.companions: Companions | None = None
 
     def take_ground(self, sensor: str, stamp_ns: IntArray, felt: FloatArray) -> None:
         """Keep samples of a sensor, (n, 3) [m/s^2]."""
@@ -159,11 +163,11 @@ class Spectra:
                 del self._parts[key]
             if (found := _even(stamps[inside] - begin, values[inside])) is not None:
                 signals[key] = found
-        speeds = self._speeds(begin, end)
+        speeds, others = self._speeds(begin, end), list(self._others(begin, end))
         for sensor in self._sensors if len(speeds) else ():
             for channel in self._channels.values():
                 if sensor in signals and channel in signals:
-                    self._add(sensor, channel, signals[sensor], signals[channel], speeds)
+                    self._add(sensor, channel, signals[sensor], signals[channel], speeds, others)
 
     def _speeds(self, begin: int, end: int) -> FloatArray:
         stamps, speed, _ = self._history.track()
@@ -171,7 +175,7 @@ class Spectra:
 
     def _add(
         self, sensor: str, channel: Channel, ground: '_Signal', housing: '_Signal',
-        speeds: FloatArray,
+        speeds: FloatArray, others: Sequence[tuple[float, float]],
     ) -> None:
         rates = ground.rate, housing.rate
         power = self._power.setdefault((sensor, channel), _Power(max(rates), min(rates)))
@@ -183,19 +187,20 @@ class Spectra:
         if speeds.max() < _SLOW:
             self._lowest_hz = _LOWEST_OF_SLOW_HZ
         power.add(np.concatenate([housing.at(time), ground.at(time)]),
-                  self._lines(power, speeds))
+                  _lines(power.frequency, speeds, others))
 
-    def _lines(self, power: _Power, speeds: FloatArray) -> BoolArray:
-        """Return in which bins rotors have their lines."""
-        frequency, width = power.frequency, _BINS / _SEGMENT_S
-        low, high = rad_s_to_hz(float(speeds.min())), rad_s_to_hz(float(speeds.max()))
-        lines = np.zeros(len(frequency), dtype=bool)
-        for order in range(1, _ORDERS + 1):
-            lines |= (frequency >= order * low - width) & (frequency <= order * high + width)
-        for other in self._moving.others:
-            line = rad_s_to_hz(other)
-            lines |= np.abs(frequency - line) <= _SLIP * line + width
-        return lines
+    def _others(self, begin: int, end: int) -> Iterator[tuple[float, float]]:
+        """Yield between which speeds other machines ran, near the rated one if nobody tells."""
+        told: list[tuple[float, SpeedTrack | None]] = [
+            (speed, None) for speed in self._moving.others]
+        if self.companions is not None:
+            told = [(one.rated_speed, one.track(begin, end, begin))
+                    for one in self.companions.others]
+        for rated, track in told:
+            if track is None:
+                yield (1.0 - _SLIP) * rated, (1.0 + _SLIP) * rated
+            else:
+                yield float(track.speed.min()), float(track.speed.max())
 
     def latest(self) -> list[Broadband]:
         """Return what is known by now of every pair, looked at after each stretch."""
@@ -241,6 +246,19 @@ class Spectra:
             channel, sensor, (self._lowest_hz, highest), power.averages, measured, ground,
             coherent, float((coherence * of_ground).sum() / of_ground.sum())
             if of_ground.any() else 0.0)
+
+
+def _lines(
+    frequency: FloatArray, speeds: FloatArray, others: Sequence[tuple[float, float]],
+) -> BoolArray:
+    """Return in which bins [Hz] rotors that run between speeds [rad/s] have their lines."""
+    own = float(speeds.min()), float(speeds.max())
+    lines = np.zeros(len(frequency), dtype=bool)
+    for slow, fast in (*((order * own[0], order * own[1]) for order in range(1, _ORDERS + 1)),
+                       *others):
+        lines |= ((frequency >= rad_s_to_hz(slow) - _BINS / _SEGMENT_S)
+                  & (frequency <= rad_s_to_hz(fast) + _BINS / _SEGMENT_S))
+    return lines
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,19 +1,21 @@
 """How did the ground move while a vector was measured? Its samples over the same turns."""
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.case.entries.sensors import GroundSensor
-from rotorsoil_ros.channel import DOFS
+from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.events import NANOSECONDS, Samples
+from rotorsoil_ros.monitor.beside.companions import Companions
 from rotorsoil_ros.monitor.vectors.axes import Axes, said_with
 from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.monitor.vectors.orders import OrderVector, SpeedTrack, Turning
 from rotorsoil_ros.monitor.vectors.pairing import MOST_UNMATCHED
 from rotorsoil_ros.monitor.vectors.refusal import Flaw, Refusal, Refusals
-from rotorsoil_ros.monitor.vectors.stretch import Finding, Stretch
+from rotorsoil_ros.monitor.vectors.stretch import Finding, FITTED, Stretch
 from rotorsoil_ros.units import RADIANS_PER_TURN
 
 _MOST_SAMPLES = 1 << 16  # of a sensor that wait for a vector of the machine
@@ -34,6 +36,9 @@ class SensorOnGround:
         self.sensor, self._history, self._turns = sensor, history, turns
         self.refusals = Refusals()
         self.first_ns = self.last_ns = -1
+        # Who runs beside the machine, and the housing by which it is told who does most.
+        self.companions: Companions | None = None
+        self.felt_most = Channel('', '', '')
         self._axes = {axis: Axes(sensor.pickup, DOFS.index(axis)) for axis in DOFS[:3]}
         self._parts: list[tuple[IntArray, FloatArray]] = []
         self._told: deque[tuple[int, ComplexArray]] = deque(maxlen=MOST_UNMATCHED)
@@ -108,10 +113,11 @@ class SensorOnGround:
         if not len(time) or time[0] > (begin + _LATE * half_ns - zero_ns) / NANOSECONDS:
             return Refusal(Flaw.MISSING, 'samples missing over the turns of a vector')
         at, until = Turning.of(time, track), (end - zero_ns) / NANOSECONDS
+        beside = self._beside(stamps, zero_ns, float(at.speed[len(time) // 2]))
         vectors = []
         for axis, axes in self._axes.items():
             # Without one of them nobody knows what it does to the machine.
-            found = self._along(axes, said[:, DOFS.index(axis)], said, at, until, track)
+            found = self._along(axes, said[:, DOFS.index(axis)], said, at, until, track, beside)
             if isinstance(found, Refusal):
                 return Refusal(found.flaw, f'{axis}: {found.text}')
             vectors.append(found.displacement[0])
@@ -120,7 +126,7 @@ class SensorOnGround:
 
     def _along(
         self, axes: Axes, values: FloatArray, said: FloatArray, at: Turning, until: float,
-        track: SpeedTrack,
+        track: SpeedTrack, beside: Sequence[SpeedTrack],
     ) -> OrderVector | Refusal:
         """Return the vector along one axis of the ground."""
         if not np.isfinite(values).all():
@@ -129,7 +135,16 @@ class SensorOnGround:
         if isinstance(along, Refusal):
             return along
         return Finding(Stretch(at, along, axes.peaks(values, said), until, self._turns,
-                               self.sensor.pickup, above_noise=0.0), track).vector()
+                               self.sensor.pickup, beside=beside, above_noise=0.0),
+                       track).vector()
+
+    def _beside(self, stamps: IntArray, zero_ns: int, speed: float) -> Sequence[SpeedTrack]:
+        """Return how other machines turned whose fields the samples tell from that of this one."""
+        if self.companions is None:
+            return ()
+        return list(self.companions.told_apart(
+            self.felt_most, int(stamps[0]), int(stamps[-1]), zero_ns=zero_ns, own=speed,
+            orders=FITTED).values())
 
     def _between(self, begin: int, end: int) -> tuple[IntArray, FloatArray]:
         """Return stamps and what was said from a stamp up to another, in order."""

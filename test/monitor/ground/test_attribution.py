@@ -8,8 +8,12 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.channel import Channel
-from rotorsoil_ros.events import Diagnostics, Grounded, Level, Measured
+from rotorsoil_ros.events import Diagnostics, Grounded, Level, Measured, Samples
+from rotorsoil_ros.monitor.beside.companions import Companion
 from rotorsoil_ros.monitor.ground.account import GroundShare
+from rotorsoil_ros.monitor.monitor import Monitor
+from rotorsoil_ros.monitor.rules import Judging
+from rotorsoil_ros.monitor.vectors.history import History
 from rotorsoil_ros.units import rpm_to_rad_s
 
 HOUSING = 'fan_end_housing_x'
@@ -80,6 +84,43 @@ def test_unbalance_that_is_not_that_of_the_case_is_not_told_as_ground(fan):
     assert found.share > 0.1
     assert found.residual_less > 0.7 * found.residual
     assert 'the machine is not as unbalanced as its case says' in found.doubt
+
+
+@pytest.fixture(scope='module')
+def house(cache):
+    return rs.Plant.load('config/fan_house.yaml', cache_directory=cache, overrides=[
+        'ground.sensors=[{name: yard, place: {x: 14.0, y: 0.0}}]'])
+
+
+@pytest.mark.parametrize('is_known', [True, False])
+def test_what_a_machine_beside_it_does_to_the_sensor_is_not_told_as_ground(house, is_known):
+    """Still ground, and two fans of 1480 and 1440 rpm that 25 turns tell apart."""
+    time, events, felt_there = np.arange(20 * 250) / 250.0, [], 0.0
+    speeds, told = rpm_to_rad_s(np.array([1480.0, 1440.0])), (History(), History())
+    for machine, speed in zip(house.machines.values(), speeds, strict=True):
+        answer = machine.model.unbalance_response(np.array([speed]), machine.case.unbalance)
+        own = machine.ground.own(np.array([speed]), answer.force)[0, 0]
+        felt_there = felt_there + (-speed**2 * own * np.exp(1j * speed * time)[:, None]).real
+    first, second = house.machines.values()
+    monitor = Monitor('fan_1', first.table, first.case.unbalance, sinks=[events.append],
+                      judging=Judging.of(first.case, turns=25.0), ground=first.ground)
+    if is_known:
+        monitor.stand_beside([Companion('fan_2', float(speeds[1]), lambda: second.table.predictor(
+            second.case.unbalance), lambda: told[1])])
+    stamps = START + np.rint(1e9 * time).astype(np.int64)
+    for start in range(0, len(time), 250):
+        part, few = slice(start, start + 250), slice(start, start + 250, 5)
+        for speed, tell in ((speeds[0], monitor.on_speed), (speeds[1], told[1].add)):
+            tell(stamps[few], np.full(50, speed), np.remainder(speed * time[few], 2.0 * np.pi))
+        monitor.on_ground('yard', Samples('fan_1', Channel('yard', '', 'z'), stamps[part],
+                                          felt_there[part, 2], False, felt_there[part]))
+        monitor.tick(int(stamps[part][-1]), stale_after_s=3.0)
+    motion = np.concatenate([event.motion for event in events if isinstance(event, Grounded)])
+    assert len(motion) > 10
+    own = first.ground.own(speeds[:1], first.table.predictor(first.case.unbalance).predict(
+        speeds[:1]).force)[0, 0]
+    share = np.median(np.linalg.norm(motion, axis=1)) / np.linalg.norm(own)
+    assert share < 1e-3 if is_known else share > 0.1
 
 
 def test_zone_without_the_ground_is_that_of_the_machine(fan):
