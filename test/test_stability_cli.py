@@ -47,6 +47,7 @@ def test_check_says_which_mode_grows_where_and_why(name, capsys, tmp_path):
     assert main(['check', str(CASES / name / 'case.yaml'), '--cache', str(tmp_path)]) == 1
     said = capsys.readouterr().out
     assert 'response peak' not in said
+    assert 'damping at' not in said
     assert 'UNSTABLE' in said
     error = next(line for line in said.splitlines() if line.startswith('error: unstable'))
     assert 'shaft bending, first (forward whirl' in error

@@ -85,7 +85,7 @@ def _check(arguments: Namespace, overrides: Sequence[str], units: Units) -> int:
     _print_table(criticals)
     peaks = _peaks(case, table)
     _print_table(_of_peaks(peaks, units))
-    _print_table(_of_damping(case, model, peaks))
+    _print_table(_of_damping(case, model, table, peaks))
     found = ((peak.channel, peak.speed, peak.amplitude) for peak in peaks)
     for warning in chain(doubts, implausible(case, found), stability_doubts(table.stability),
                          without_transients(case, table), warnings(case, shapes),
@@ -257,12 +257,13 @@ def _of_peaks(peaks: Sequence[Peak], units: Units) -> Iterable[tuple[str, str]]:
 
 
 def _of_damping(
-    case: Case, model: CoupledModel, peaks: Sequence[Peak],
+    case: Case, model: CoupledModel, table: ResponseTable, peaks: Sequence[Peak],
 ) -> Iterable[tuple[str, str]]:
     """Yield what takes the energy of the unbalance at every peak, and at the highest speed."""
-    if not np.any(case.unbalance):
-        return
     speed = np.array([*(peak.speed for peak in peaks), case.speed_range[1]])
+    speed = speed[table.stability.holds(speed)]  # elsewhere there is no steady motion
+    if not np.any(case.unbalance) or not len(speed):
+        return
     split = DampingSplitter(model).forced(speed, case.unbalance)
     for row, at in enumerate(speed.tolist()):
         yield (f'damping at {rad_s_to_rpm(at):.6g} rpm',

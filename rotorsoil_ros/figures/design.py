@@ -209,7 +209,7 @@ def response_figure(machine: Machine, report: DesignReport) -> Figure:
             axes.plot([report.speed_rpm] * 2, ends[[0, 2]], color=COLOURS[0], marker='_',
                       markersize=9, linewidth=2.5, label='looked at closely')
         rpm = _speeds_of(machine, rpm)
-        largest = _draw_velocity(axes, machine, worst, rpm)
+        largest = _draw_velocity(axes, machine, worst, rpm, has_band=bool(report.stable))
         limits = np.array([report.case.zones.of(worst.support, speed)
                            for speed in rpm_to_rad_s(rpm)])
         for (name, colour), limit in zip(ZONE_COLOURS.items(), limits.T, strict=True):
@@ -230,11 +230,21 @@ def _speeds_of(machine: Machine, rpm: FloatArray) -> FloatArray:
 
 
 def _draw_velocity(
-    axes: Axes, machine: Machine, worst: HousingAnswer, rpm: FloatArray,
+    axes: Axes, machine: Machine, worst: HousingAnswer, rpm: FloatArray, *, has_band: bool,
 ) -> float:
-    """Draw the band and the answer of the case; return the largest of both [mm/s]."""
-    low, nominal, high = machine.bounds(rpm=rpm)[worst.channel].velocity_mm_s_rms()[:, :, 0]
-    if np.isfinite(high).any():
+    """
+    Draw the band and the answer of the case; return the largest of both [mm/s].
+
+    About a machine that is not stable no band is drawn: most of what it may be is not either,
+    and each would be looked through for what grows.
+    """
+    speed = rpm_to_rad_s(rpm)
+    answered = machine.table.predictor(machine.case.unbalance).answer(speed).displacement
+    column = machine.table.channels.index(worst.channel)
+    nominal = high = to_mm_s_rms(speed * np.abs(answered[:, column]))
+    if has_band:
+        low, _, high = machine.bounds(rpm=rpm)[worst.channel].velocity_mm_s_rms()[:, :, 0]
+    if has_band and np.isfinite(high).any():
         axes.fill_between(rpm, low, high, color=COLOURS[0], alpha=0.2, linewidth=0.0,
                           label='lowest to highest')
     axes.plot(rpm, nominal, color=COLOURS[0], linewidth=1.4, label='as the case says')

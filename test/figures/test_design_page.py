@@ -8,6 +8,7 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.cli import main
+from rotorsoil_ros.figures.design import response_figure
 
 from house import sheets
 
@@ -92,6 +93,17 @@ def test_unstable_machine_is_told_in_red_without_a_number(tmp_path):
     assert 'class="verdict bad"' in page
     assert 'Unstable: a vibration grows' in page
     assert not any(value for one in numbers['housings'] for value in one['velocity_mm_s_rms'])
+
+
+def test_no_band_is_drawn_about_an_unstable_machine(tmp_path):
+    machine = rs.load(FAN, cache_directory=tmp_path, **{
+        'rotor.bearings.0.stiffness': {'xx': 2e8, 'zz': 2e8, 'xz': 1e8, 'zx': -1e8}})
+    report = machine.report(rpm=990)
+    axes = response_figure(machine, report).axes[0]
+    assert report.stable is False
+    assert 'as the case says' in axes.get_legend_handles_labels()[1]
+    # Each of the many machines of a band would be looked through for what grows.
+    assert 'envelope' not in vars(machine)
 
 
 def test_speed_beyond_the_range_is_one_line_and_nothing_is_written(tmp_path, capsys):
