@@ -15,7 +15,7 @@ from rotorsoil_ros.rotor.whirl import ORBITS
 FELT_BELOW = 0.2
 
 # Newton's iteration stops at this relative step, whose square is the error left.
-_CONVERGED = 1e-6
+_CONVERGED = 1e-7
 _ITERATIONS = 12
 
 # Steps of inverse iteration after which what is near a frequency is all that is left.
