@@ -90,9 +90,12 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
         assert aside == Path('/dev/null')
 
 
-# From within: a signal of another process may come when all is over.
+# From within: a signal of another process may come when all is over. What a shell runs in the
+# background inherits that interrupts are ignored.
 INTERRUPTS = """
 import os, runpy, signal, sys
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 class Interrupting:
     def find_spec(self, name, *rest):
