@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.continuation import Continuation
@@ -147,32 +148,29 @@ def _states(
 @dataclass(frozen=True)
 class Elastic:
     """
-    Coordinates y of foundations that bend, each on a spring of its own.
+    Coordinates y of foundations that bend, each on a spring of one and by itself, as `parted`.
 
-    They obey (k - w^2 m) y = E^T f + w^2 M^T z, with f the force through the bearings and z the
+    They obey (1 - w^2 m) y = E^T f + w^2 M^T z, with f the force through the bearings and z the
     motion of the support otherwise, so that they need not be unknowns.
 
     Attributes
     ----------
-    rows : (2 b, e) float array
+    rows : (2 b, e) complex array
         E, housing motion per each.
-    coupling : (s, e) float array
+    coupling : (s, e) complex array
         M, mass between each and the motion of the support.
-    mass : (e,) float array
+    mass : (e,) complex array
         m of each.
-    spring : (e,) complex array
-        k of each, with its loss.
 
     """
 
-    rows: FloatArray
-    coupling: FloatArray
-    mass: FloatArray
-    spring: ComplexArray
+    rows: ComplexArray
+    coupling: ComplexArray
+    mass: ComplexArray
 
     def gains(self, frequency: ComplexArray) -> ComplexArray:
         """Return what each moves per force, (n, p, e)."""
-        return np.asarray(1.0 / (self.spring - frequency[..., None] ** 2 * self.mass))
+        return np.asarray(1.0 / (1.0 - frequency[..., None] ** 2 * self.mass))
 
     def follows(
         self, frequency: ComplexArray,
@@ -194,3 +192,27 @@ class Elastic:
         """Return the coordinates under forces (n, p, 2 b) and motions (n, p, s), (n, p, e)."""
         force = through @ self.rows + frequency[..., None] ** 2 * (support @ self.coupling)
         return self.gains(frequency) * force
+
+
+def parted(support: Support) -> ComplexArray:
+    """
+    Return the motion of a support per coordinates of which no elastic one is tied to another.
+
+    By columns T, (s, s), the elastic ones last: T^T K T has ones for these and nothing beside
+    them, T^T M T is diagonal among them. Bodies of unlike loss make all that complex.
+    """
+    own, size = len(support.motion_mass) - support.elastic, len(support.motion_mass)
+    bends, rest = slice(own, size), slice(0, own)
+    # With the unit springs, which belong to the compliance otherwise.
+    tied = support.motion_spring[bends, rest]
+    spring = support.motion_spring[bends, bends] + np.eye(support.elastic)
+    mass, axes = np.linalg.eigh(support.motion_mass[bends, bends])
+    mass[mass < _MASSLESS * mass.max(initial=0.0)] = 0.0
+    held = axes.T @ spring @ axes
+    _, shapes = np.linalg.eig(np.linalg.solve(held, np.diag(mass)))
+    # Those of one frequency, and of no mass, may still be tied to each other.
+    scale = scipy.linalg.sqrtm(shapes.T @ held @ shapes)
+    turn = np.eye(size, dtype=complex)
+    turn[bends, rest] = -np.linalg.solve(spring, tied)
+    turn[bends, bends] = axes @ np.linalg.solve(scale.T, shapes.T).T
+    return turn

@@ -41,9 +41,9 @@ class FreeVibration:
         Their deflection at the bearings, and how much forces there drive them.
     bearings : three (n, 2 b, 2 b) complex arrays
         The series of `Bearings.series`, a + w b - w^2 c over (x, z) of each.
-    rows : (2 b, s) float array
+    rows : (2 b, s) complex array
         Housing motion per motion of the support.
-    mass : (s, s) float array
+    mass : (s, s) complex array
         Of the support.
     spring : (s, s) complex array
         Its stiffness beside the compliance: of foundations that bend.
@@ -72,8 +72,8 @@ class FreeVibration:
     journals: AnyArray
     driven: AnyArray
     bearings: tuple[ComplexArray, ComplexArray, ComplexArray]
-    rows: FloatArray
-    mass: FloatArray
+    rows: ComplexArray
+    mass: ComplexArray
     spring: ComplexArray
     elastic: Elastic
     compliance: Continuation

@@ -11,7 +11,7 @@ from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
 from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes.below import Elastic, SupportModes
+from rotorsoil_ros.machine.modes.below import Elastic, parted, SupportModes
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
 from rotorsoil_ros.machine.modes.shafts import MORE_SHAPES, ShaftLine, Shafts
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of
@@ -281,7 +281,8 @@ class SpectrumSolver:
                          axis=2)
         support = np.concatenate([
             vector[..., vector.shape[2] - len(vibration.mass):] * vibration.compliance.size,
-            vibration.bent(np.where(exists, frequency, 0.0), vector) @ self._turn.T], axis=-1)
+            vibration.bent(np.where(exists, frequency, 0.0), vector)],
+            axis=-1) @ self._parted[0].T
         moving = np.sqrt(shafts.mass) * rotor
         forward, backward = (np.abs(moving) ** 2).sum(axis=-1).transpose(2, 0, 1)
         values, axes = np.linalg.eigh(self.model.support.motion_mass)
@@ -303,22 +304,19 @@ class SpectrumSolver:
         zone: Zone, reach: float,
     ) -> FreeVibration:
         inverse, right, left = whirls
-        model, support, size = self.model, self.model.support, zone.compliance.size
+        model, size = self.model, zone.compliance.size
         unit, journals = np.repeat(np.sqrt(self.shafts.springs), 2), self.shafts.journals
         constant, rate, inertia = (part / (unit[:, None] * unit)
                                    for part in model.all_bearings.series(speed, zone.between))
-        own, mass, turn = len(size), support.motion_mass, self._turn
-        held = slice(0, own)
-        spring = np.diagonal(turn.T @ support.motion_spring[own:, own:] @ turn)
-        elastic = Elastic(
-            unit[:, None] * support.motion_rows[:, own:] @ turn,
-            size[:, None] * mass[:own, own:] @ turn,
-            np.diagonal(turn.T @ mass[own:, own:] @ turn), 1.0 + spring)
+        held, bends = slice(0, len(size)), slice(len(size), None)
+        _, rows, mass, spring = self._parted
+        rows = unit[:, None] * rows
+        elastic = Elastic(rows[:, bends], size[:, None] * mass[held, bends],
+                          np.diagonal(mass[bends, bends]))
         return FreeVibration(
             inverse, journals @ right, journals @ left.swapaxes(2, 3), (constant, rate, inertia),
-            unit[:, None] * support.motion_rows[:, held] * size,
-            size[:, None] * mass[held, held] * size,
-            size[:, None] * support.motion_spring[held, held] * size, elastic, zone.compliance,
+            rows[:, held] * size, size[:, None] * mass[held, held] * size,
+            size[:, None] * spring[held, held] * size, elastic, zone.compliance,
             self.span[1], reach, zone.ends(zone.told, speed),
             tuple(zip(self.shafts.seats, self.shafts.modes, strict=True)),
             self._below[id(zone.compliance)], unit[:, None] * self._moves(zone.compliance),
@@ -339,15 +337,12 @@ class SpectrumSolver:
             for piece in self.pieces}
 
     @cached_property
-    def _turn(self) -> FloatArray:
-        """
-        Elastic coordinates of the support between which there is no mass, by columns, (e, e).
-
-        What several losses would join them by is left out: of each is kept what it loses itself.
-        """
-        own = len(self.model.support.motion_mass) - self.model.support.elastic
-        _, turn = np.linalg.eigh(self.model.support.motion_mass[own:, own:])
-        return np.asarray(turn)
+    def _parted(self) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Coordinates of the support as `parted`, and its rows, mass and stiffness over them."""
+        support = self.model.support
+        turn = parted(support)
+        return (turn, support.motion_rows @ turn, turn.T @ support.motion_mass @ turn,
+                turn.T @ support.motion_spring @ turn)
 
 
 def _merged(parts: list[Spectrum], count: int) -> Spectrum:

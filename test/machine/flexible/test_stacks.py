@@ -1,6 +1,7 @@
 """Bodies that stand on one another answer as finite elements of all of them, welded, do."""
 
 from dataclasses import replace
+import math
 
 from boxes import elements, ON_FOUR, ON_ONE, RAFT, XYZ
 from foundations import bearing, FOOTING, off, Springs
@@ -14,13 +15,15 @@ from rotorsoil_ros.errors import RotorSoilError
 from rotorsoil_ros.ground.bed import PatchesApart
 from rotorsoil_ros.ground.soil import Rectangle, RigidSoil
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.damping import DampingSplitter, SOIL, STRUCTURE
+from rotorsoil_ros.machine.damping import BEARINGS, DampingSplitter, SOIL, STRUCTURE
 from rotorsoil_ros.machine.flexible.body import CONTACT, Dof, FlexibleBody, PROBE, SEAT
 from rotorsoil_ros.machine.foundation import Foundation, Stand
+from rotorsoil_ros.machine.modes.campbell import campbell
 from rotorsoil_ros.machine.modes.critical import critical_speeds
 from rotorsoil_ros.machine.support import Support
 
 from machines import paper_rotor
+from oracles.dense import eigenvalues_of, rotor_matrices
 
 TURN = 2.0 * np.pi
 SOME = TURN * np.array([0.05, 7.0, 19.0, 33.0, 51.0])
@@ -57,36 +60,51 @@ def ground(block):
                         block.body.about_centre[block.body.contacts])
 
 
-def welded(asked, places, omega, moved=None):
+def meshes(asked, places):
     """
-    Return the seats' receptance, or what ground that moves does, of both meshes in one system.
+    Return both meshes side by side, with no mode, no reduction and no rigid motion.
 
-    Dense, with the weld as equations of their own: no mode, no reduction, no rigid motion.
+    Stiffness of raft and of frame, mass, and by rows the weld, the patches and the seats.
     """
     parts = [elements('raft', RAFT), elements('frame', asked)]
-    stiffness = scipy.linalg.block_diag(*(
-        (1.0 + 1j * LOSSES[name]) * part.stiffness.toarray()
-        for name, part in zip(('raft', 'frame'), parts, strict=True)))
+    first, size = (sum(part.stiffness.shape[0] for part in parts[:count]) for count in (1, 2))
+    bends = np.zeros((2, size, size))
+    bends[0, :first, :first] = parts[0].stiffness.toarray()
+    bends[1, first:, first:] = parts[1].stiffness.toarray()
     mass = scipy.linalg.block_diag(*(part.mass.toarray() for part in parts))
-    first = parts[0].stiffness.shape[0]
 
-    def rows(part, wanted):
-        names = [f'{dof.station}_{dof.axis}' for dof in part.interface]
-        return part.pick.toarray()[[names.index(name) for name in wanted]]
+    def rows(index, wanted):
+        names = [f'{dof.station}_{dof.axis}' for dof in parts[index].interface]
+        found = np.zeros((len(wanted), size))
+        found[:, [slice(0, first), slice(first, size)][index]] = (
+            parts[index].pick.toarray()[[names.index(name) for name in wanted]])
+        return found
 
     contacts = [f'{dof.station}_{dof.axis}' for dof in parts[1].interface if dof.kind == CONTACT]
     stations = list(dict.fromkeys(name.rpartition('_')[0] for name in contacts))
     below = [f'{places[stations.index(name.rpartition("_")[0])]}_{name.rpartition("_")[2]}'
              for name in contacts]
-    weld = np.concatenate([-rows(parts[0], below), rows(parts[1], contacts)], axis=1)
-    patch = np.zeros((12, len(mass)))
-    patch[:, :first] = rows(parts[0], [f'patch_{one}_{axis}' for one in range(4) for axis in XYZ])
-    seats = np.zeros((4, len(mass)))
-    seats[:, first:] = rows(parts[1], ['b1_x', 'b1_z', 'b2_x', 'b2_z'])
+    patches = rows(0, [f'patch_{one}_{axis}' for one in range(4) for axis in XYZ])
+    return (bends, mass, rows(1, contacts) - rows(0, below), patches,
+            rows(1, ['b1_x', 'b1_z', 'b2_x', 'b2_z']))
+
+
+def losing(bends):
+    """Return the stiffness of both meshes with what each loses."""
+    return sum((1.0 + 1j * loss) * own for loss, own in zip(LOSSES.values(), bends, strict=True))
+
+
+def welded(asked, places, omega, moved=None):
+    """
+    Return the seats' receptance, or what ground that moves does, of both meshes in one system.
+
+    Dense, with the weld as equations of their own.
+    """
+    bends, mass, weld, patch, seats = meshes(asked, places)
     found = []
     for one in omega:
         spring = np.diag(np.tile(1.0 / FOOTING.compliance(np.array([one]))[0].diagonal()[:3], 4))
-        dynamic = stiffness + patch.T @ spring @ patch - one**2 * mass
+        dynamic = losing(bends) + patch.T @ spring @ patch - one**2 * mass
         scale = np.abs(dynamic).max()
         system = np.block([[dynamic, scale * weld.T], [scale * weld, np.zeros((len(weld),) * 2)]])
         load = seats.T if moved is None else patch.T @ spring @ np.tile(moved, (4, 1))
@@ -263,26 +281,93 @@ def machine(asked, places):
                         support.soil_models)
 
 
-def test_criticals_are_found_and_who_damps_them_adds_up():
-    model = machine(*STACKS[1])
-    found = critical_speeds(model, (TURN * 5.0, TURN * 60.0))
+def whole(model, asked, places, speed):
+    """
+    Return what the rotor on both meshes is: all motions that the weld lets be.
+
+    Stiffness, damping, mass; by rows the gaps of the bearings, meshes and patches.
+    """
+    bends, mass, weld, patch, seats = meshes(asked, places)
+    free = scipy.linalg.null_space(weld)
+    stiffness, inertia, gyroscopic = rotor_matrices(model.rotor)
+    own = len(stiffness)
+    mesh = np.concatenate([np.zeros((len(mass), own)), free], axis=1)
+    patch = patch @ mesh
+    nodes = [4 * model.rotor.node_of(one.position) for one in model.rotor.bearings]
+    gap = np.eye(mesh.shape[1])[[node + axis for node in nodes for axis in range(2)]]
+    gap -= seats @ mesh
+    soft, dashpots = (np.diag(np.tile(part[:3], 4)) for part in (
+        FOOTING.stiffness * (1.0 + 1j * FOOTING.loss), FOOTING.damping))
+    springs, dampers, _ = (part[0] for part in model.all_bearings.coefficients(
+        *2 * (np.array([speed]),)))
+    k = mesh.T @ losing(bends) @ mesh + patch.T @ soft @ patch + gap.T @ springs @ gap
+    c = patch.T @ dashpots @ patch + gap.T @ dampers @ gap
+    m = mesh.T @ mass @ mesh
+    k[:own, :own] += stiffness
+    c[:own, :own] += speed * gyroscopic
+    m[:own, :own] += inertia
+    return k, c, m, gap, mesh, patch
+
+
+@pytest.mark.parametrize('asked, places', STACKS)
+def test_modes_are_those_of_both_meshes(asked, places):
+    """Whose losses differ: what they join of bending is in the modes."""
+    model, speed = machine(asked, places), 100.0
+    found = campbell(model, np.array([speed]), 14).eigenvalue[0]
+    exact = eigenvalues_of(*whole(model, asked, places, speed)[:3])
+    exact = exact[exact.imag > 0.2 * np.abs(exact)][:len(found)]
+    np.testing.assert_allclose(found, exact, rtol=1e-7)
+
+
+def taken(model, bends, parts, w, shape, speed):
+    """Return the shares of bearings, raft, frame and soil of what takes energy in a motion."""
+    gap, mesh, patch = (rows @ shape for rows in parts)
+    springs, dampers, _ = (part[0] for part in model.all_bearings.coefficients(
+        *2 * (np.array([speed]),)))
+    films = np.vdot(gap, (springs + 1j * w * dampers) @ gap).imag
+    losses = [loss * np.vdot(mesh, own @ mesh).real
+              for loss, own in zip(LOSSES.values(), bends, strict=True)]
+    dynamic = FOOTING.stiffness * (1.0 + 1j * FOOTING.loss) + 1j * w * FOOTING.damping
+    soil = (np.abs(patch.reshape(4, 3)) ** 2 @ dynamic[:3].imag).sum()
+    return np.array([films, *losses, soil]) / (films + sum(losses) + soil)
+
+
+def shares(split, row):
+    return [split.share(*part)[row] for part in (
+        (BEARINGS,), (STRUCTURE, 'raft'), (STRUCTURE, 'frame'), (SOIL, 'raft'))]
+
+
+@pytest.mark.parametrize('asked, places', STACKS)
+def test_what_damps_a_mode_is_what_both_meshes_lose_in_it(asked, places):
+    model, (bends, *_) = machine(asked, places), meshes(asked, places)
+    found = critical_speeds(model, (TURN * 5.0, TURN * 90.0))
     light = [one for one in found if one.damping_ratio < 0.3]
-    assert light
-    for split in DampingSplitter(model).of_modes(light):
+    assert len(light) > 3
+    for one, split in zip(light, DampingSplitter(model).of_modes(light), strict=True):
         assert split is not None
-        names = [part for part in split.parts if part[0] in (STRUCTURE, SOIL)]
-        assert names == [(STRUCTURE, 'raft'), (STRUCTURE, 'frame'), (SOIL, 'raft')]
-        assert split.share(STRUCTURE)[0] > 0.0
-    speed, unbalance = TURN * np.array([11.0, 23.0, 37.0]), np.zeros(len(model.planes)) + 0j
+        w = one.speed * (1.0 + 1j * one.damping_ratio / math.sqrt(1.0 - one.damping_ratio**2))
+        k, c, m, *parts = whole(model, asked, places, one.speed)
+        # What the equations send to zero there.
+        shape = np.linalg.svd(k + 1j * w * c - w**2 * m)[2][-1].conj()
+        np.testing.assert_allclose(
+            shares(split, 0), taken(model, bends, parts, w, shape, one.speed), atol=1e-6)
+
+
+@pytest.mark.parametrize('asked, places', STACKS)
+def test_what_an_unbalance_puts_in_is_what_both_meshes_lose(asked, places):
+    model, (bends, *_) = machine(asked, places), meshes(asked, places)
+    speeds, unbalance = TURN * np.array([11.0, 23.0, 37.0]), np.zeros(len(model.planes)) + 0j
     unbalance[0] = 1e-3
-    forced = DampingSplitter(model).forced(speed, unbalance)
-    answer = model.unbalance_response(speed, unbalance)
-    disc = [model.channels.index(f'{model.planes[0]}_{axis}') for axis in 'xz']
-    load = speed[:, None]**2 * unbalance[0] * np.array([-1j, 1.0])
-    power = np.pi * (answer.displacement[:, disc].conj() * load).imag.sum(axis=1)
-    np.testing.assert_allclose(forced.total, power, rtol=1e-8)
-    assert np.all(forced.share(STRUCTURE, 'raft') > 0.0)
-    assert np.all(forced.share(STRUCTURE, 'frame') > 0.0)
+    found = DampingSplitter(model).forced(speeds, unbalance)
+    node = 4 * model.rotor.node_of(model.rotor.discs[0].position)
+    for row, speed in enumerate(speeds.tolist()):
+        k, c, m, *parts = whole(model, asked, places, speed)
+        load = np.zeros(len(k), dtype=complex)
+        load[node:node + 2] = speed**2 * unbalance[0] * np.array([-1j, 1.0])
+        shape = np.linalg.solve(k + 1j * speed * c - speed**2 * m, load)
+        assert found.total[row] == pytest.approx(math.pi * np.vdot(shape, load).imag, rel=1e-8)
+        np.testing.assert_allclose(
+            shares(found, row), taken(model, bends, parts, speed, shape, speed), atol=1e-8)
 
 
 def test_what_is_not_there_is_refused():
