@@ -14,9 +14,11 @@ import scipy.io
 
 from rotorsoil_ros.case.config import load
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.plant.berth import mounts
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.figures.bending import bending_figure
 from rotorsoil_ros.figures.drawing import machine_drawing
+from rotorsoil_ros.machine.flexible.lattice import Lattice
 
 HERE = Path(__file__).parent
 
@@ -41,6 +43,23 @@ def test_a_column_of_the_frame_is_a_cantilever_of_the_textbook():
     shear, area, second = build.CONCRETE / 2.4 * 5.0 / 6.0, 0.36, 0.6**4 / 12.0
     exact = 4.0**3 / (3.0 * build.CONCRETE * second) + 4.0 / (shear * area)
     assert np.linalg.inv(spring[6:, 6:])[0, 0] == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize('file, settings, joined', [
+    # Columns and beams, and the bearings on the two of these that run across.
+    ('turbine_deck.yaml', [], [('footing', 'corner')] * 4 + [('corner', 'corner')] * 4
+     + [('bearing', 'corner')] * 4),
+    # Probes on its top tell how it heaves there, not how it lies.
+    ('raft_house.yaml', ['source=fan_1'], [('patch', 'patch')] * 16
+     + [('fan_1', 'patch')] * 2 + [('fan_2', 'patch')] * 2)])
+def test_seats_stand_on_a_body_of_what_tells_how_it_lies(file, settings, joined):
+    case = load(HERE / file, overrides=settings)
+    [block] = case.foundations
+    drawn = Lattice.whole(block, mounts(case))
+    kinds = [name.rpartition('_')[0].removesuffix('_drive').removesuffix('_fan')
+             for name in drawn.named]
+    assert [(kinds[one], kinds[other]) for one, other in drawn.edges.tolist()
+            if max(one, other) < len(kinds)] == joined
 
 
 @pytest.mark.parametrize('file, settings', [

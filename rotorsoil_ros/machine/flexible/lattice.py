@@ -1,8 +1,8 @@
 """How a foundation that bends is drawn: its places, the lines between them, and their motion."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 import math
 
 import numpy as np
@@ -36,7 +36,7 @@ class Lattice:
     follow : (k, 3, c) float array
         Motion along x, y, z per motion of the channels.
     edges : (e, 2) int array
-        Which places a line joins.
+        Which places a line joins; a probe that tells one direction only is a point.
 
     """
 
@@ -69,7 +69,7 @@ class Lattice:
         assert body is not None
         index = {channel: column for column, channel in enumerate(channels)}
         follow: dict[str, FloatArray] = {}
-
+        seats: set[str] = set()
         where = _places(block, body)
 
         def moves(station: str, direction: Sequence[float], channel: Channel) -> None:
@@ -80,6 +80,7 @@ class Lattice:
         for mount in mounts:
             bearing = mount.bearing
             if bearing.foundation == block.name and bearing.pedestal is None:
+                seats.add(bearing.seat or bearing.name)
                 for direction, channel in zip(
                         mount.axes, across(bearing.name, HOUSING), strict=True):
                     moves(bearing.seat or bearing.name, direction, channel)
@@ -87,8 +88,7 @@ class Lattice:
             if not channel.is_rotation:
                 moves(dof.station, np.eye(3)[DOFS.index(dof.axis)], channel)
         places = [where[station] for station in follow]
-        edges = _neighbours(np.array(places), [
-            body.bed == EACH and station in _stations(body) for station in follow])
+        edges = _edges(body, np.array(places), follow, seats)
         rows = [*follow.values()]
         for corners, own in _footings(block, body, where, index):
             ring = len(places) + np.arange(len(corners))
@@ -126,8 +126,27 @@ def _points(body: FlexibleBody, name: str) -> Iterator[tuple[Dof, Channel]]:
         yield body.dofs[row], channel
 
 
-def _stations(body: FlexibleBody) -> set[str]:
-    return {dof.station for dof in body.dofs if dof.kind == CONTACT}
+def _edges(
+    body: FlexibleBody, places: FloatArray, follow: Mapping[str, FloatArray],
+    seats: Collection[str],
+) -> list[tuple[int, int]]:
+    """
+    Return which places a line joins.
+
+    Contacts and probes make the body; seats stand on those of them that are around. Footings
+    that stand apart are joined by what stands on them alone, by seats where no probe does.
+    """
+    footings = {dof.station for dof in body.dofs if dof.kind == CONTACT}
+    borne = [at for at, station in enumerate(follow) if station in seats]
+    # A probe that tells one direction says little of how the body lies there.
+    firm = [at for at, (station, rows) in enumerate(follow.items()) if station not in seats and (
+        station in footings or np.count_nonzero(rows.any(axis=1)) > 1)]
+    apart = {at for at in firm if body.bed == EACH and [*follow][at] in footings}
+    if len(apart) == len(firm):
+        firm, borne = [*firm, *borne], []
+    pairs = [(pair, firm) for pair in combinations(firm, 2) if not apart.issuperset(pair)]
+    pairs += [(pair, [*firm, *borne]) for pair in product(borne, firm)]
+    return [pair for pair, rivals in pairs if _are_neighbours(places, pair, rivals)]
 
 
 def _places(block: Foundation, body: FlexibleBody) -> dict[str, list[float]]:
@@ -164,18 +183,9 @@ def _footings(
         yield corners, rows
 
 
-def _neighbours(places: FloatArray, is_apart: Sequence[bool]) -> list[tuple[int, int]]:
-    """
-    Return pairs of places between which no other lies (Gabriel's graph).
-
-    Footings that stand apart are joined by what stands on them alone.
-    """
-    found = []
-    for one, other in combinations(range(len(places)), 2):
-        middle = 0.5 * (places[one] + places[other])
-        ball = _BALL * np.linalg.norm(places[one] - middle)
-        inside = np.linalg.norm(places - middle, axis=1) < ball
-        inside[[one, other]] = False
-        if not inside.any() and not (is_apart[one] and is_apart[other]):
-            found.append((one, other))
-    return found
+def _are_neighbours(places: FloatArray, pair: tuple[int, int], rivals: Sequence[int]) -> bool:
+    """Return whether no rival lies between two places (Gabriel's graph)."""
+    middle = places[list(pair)].mean(axis=0)
+    ball = _BALL * np.linalg.norm(places[pair[0]] - middle)
+    others = [at for at in rivals if at not in pair]
+    return bool(np.all(np.linalg.norm(places[others] - middle, axis=1) >= ball))

@@ -57,6 +57,9 @@ def test_footings_apart_are_joined_by_the_frame_alone(frame):
     feet = {drawn.named.index(f'patch_{number}') for number in (1, 2, 3, 4)}
     assert not [edge for edge in drawn.edges.tolist() if set(edge) <= feet]
     assert {foot for edge in drawn.edges.tolist() for foot in edge} >= feet
+    beams = [edge for edge in drawn.edges.tolist() if max(edge) < len(drawn.named)
+             and not set(edge) & feet]
+    assert len(beams) == 3  # between four bearings in a row, which are all that is known above
     together = replace(frame.foundations[0], body=replace(frame.foundations[0].body, bed=WINKLER))
     edges = Lattice.of(together, frame.mounts, channels(frame)).edges.tolist()
     assert [edge for edge in edges if set(edge) <= feet]
@@ -71,6 +74,10 @@ def test_patches_of_a_raft_are_joined_to_their_neighbours(raft):
              if one in on_ground and other in on_ground]
     # Six by two patches of 2 x 2 m: five and five along, six across, none aslant.
     assert found == pytest.approx([2.0] * 16)
+    stalks = [edge for edge in drawn.edges.tolist() if not set(edge) <= set(on_ground)]
+    # Each of four seats on the patch below it, which reaches half a metre farther out.
+    assert [math.dist(places[seat], places[patch]) for seat, patch in stalks] == pytest.approx(
+        [math.hypot(0.5, places[0, 2])] * 4)
 
 
 def test_seats_of_a_turned_machine_move_along_its_own_axes(raft):
