@@ -16,7 +16,9 @@ from rotorsoil_ros.wire.messages import (
     diagnostic_array,
     DIAGNOSTICS_TOPIC,
     Encoder,
+    JointStateWriter,
     Messenger,
+    NODE_NAME,
     Topics,
 )
 
@@ -82,6 +84,18 @@ class Plant:
         self.board.refresh(round(at_s * SECOND))
         (machine,) = self.board.machines.values()
         return machine
+
+
+def totals(inbox, plant, at_s, told, level=Level.OK):
+    """Have the machines of a plant do something together: displacement and velocity by channel."""
+    stamp_ns = START + round(at_s * SECOND)
+    if told:
+        values = np.array([[*zip(*((size, velocity, math.nan)
+                                   for size, velocity in told.values()), strict=True)]])
+        [payload] = JointStateWriter([*told], plant).write([stamp_ns], values)
+        inbox.take(f'/{NODE_NAME}/{plant}/total', payload)
+    inbox.take(DIAGNOSTICS_TOPIC, diagnostic_array(
+        Diagnostics(plant, stamp_ns, level, 'at least', {}), node=NODE_NAME))
 
 
 class Hands:

@@ -52,7 +52,7 @@ class AddressSpace:
     def __init__(self, server: 'Server', index: int) -> None:
         self._server, self._index = server, index
         self._known: dict[str, dict[tuple[str, str], ua.NodeId]] = {}
-        self._plants: set[str] = set()
+        self._places: set[str] = set()
 
     async def open(self) -> None:
         """Make the place where machines will stand."""
@@ -64,13 +64,13 @@ class AddressSpace:
         known = self._known.get(machine.name)
         if known is None:
             known = self._known[machine.name] = {}
-            plant, _, name = machine.name.rpartition('/')
-            if plant and plant not in self._plants:
-                self._plants.add(plant)
-                await self._add([self._object(self._id(ROOT), plant, plant, plant,
-                                              kind=_FOLDER, by=_ORGANIZES)])
-            await self._add([self._object(self._id(plant or ROOT), machine.name, name,
-                                          machine.name, kind=_OBJECT, by=_ORGANIZES)])
+            plant, _, _ = machine.name.rpartition('/')
+            for path, below in ((plant, ROOT), (machine.name, plant or ROOT)):
+                if path and path not in self._places:
+                    self._places.add(path)
+                    await self._add([self._object(
+                        self._id(below), path, path.rpartition('/')[2], path, kind=_OBJECT,
+                        by=_ORGANIZES)])
         gone = [key for key in known if key not in machine.points]
         fresh = [point for key, point in machine.points.items() if key not in known]
         for channel in dict.fromkeys(channel for channel, _ in gone):

@@ -1,9 +1,10 @@
 """The state of every machine as a feed tells it: the one translation of topics into values."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 import math
 
+from rotorsoil_ros.arrays import FloatArray
 from rotorsoil_ros.events import Level, NANOSECONDS
 from rotorsoil_ros.feeds.hearsay import (
     channels_of,
@@ -13,9 +14,17 @@ from rotorsoil_ros.feeds.hearsay import (
     reports_of,
     Speaker,
     TOLD,
+    TOTAL,
     VectorReader,
 )
-from rotorsoil_ros.feeds.points import Point, Quality, quantities_of, unit_of
+from rotorsoil_ros.feeds.points import (
+    Point,
+    Quality,
+    quantities_of,
+    quantities_of_plant,
+    Quantity,
+    unit_of,
+)
 from rotorsoil_ros.monitor.health import GAPS, STANDING
 from rotorsoil_ros.monitor.verdict import MM, VIBRATION
 
@@ -37,7 +46,7 @@ WORDS = {'predicted_zone': 'PredictedZone', 'measured_zone': 'MeasuredZone', 've
 
 class MachineBoard:
     """
-    What is known of one machine.
+    What is known of one machine, or of those of a plant together.
 
     Attributes
     ----------
@@ -53,13 +62,16 @@ class MachineBoard:
 
     """
 
-    def __init__(self, name: str, *, plant: bool) -> None:
+    def __init__(
+        self, name: str, *, plant: bool,
+        quantities: Callable[[str], Mapping[str, Quantity]] = quantities_of,
+    ) -> None:
         self.name = name
         self.channels: tuple[str, ...] = ()
         self.is_silent = False
         self.points: dict[tuple[str, str], Point] = {}
         self.changed: dict[tuple[str, str], Point] = {}
-        self._plant = plant
+        self._plant, self._quantities = plant, quantities
         self._heard_ns = 0
         self._counts: dict[str, float] = {}
         self._why = Quality.UNANSWERED  # if a number has no answer
@@ -90,14 +102,13 @@ class MachineBoard:
         self.channels = channels
 
     def take_vector(
-        self, name: str, stamp_ns: int, channels: Sequence[str], fields: Mapping[str, object],
+        self, name: str, stamp_ns: int, channels: Sequence[str], fields: Mapping[str, FloatArray],
     ) -> None:
         """Take a JointState of one topic of the machine."""
-        quantity, field = TOLD[name]
         if fresh := [channel for channel in channels if (channel, REASON) not in self.points]:
             self.take_shape([*self.channels, *fresh])
-        for channel, value in zip(channels, fields[field].tolist(), strict=True):  # type: ignore[attr-defined]
-            if (channel, quantity) in self.points:
+        for quantity, field in TOLD[name].items():
+            for channel, value in zip(channels, fields[field].tolist(), strict=True):
                 self._tell(channel, quantity, value, stamp_ns, self._why)
 
     def take_report(self, report: Report) -> None:
@@ -110,7 +121,7 @@ class MachineBoard:
         self._tell('', 'State', _level(report.level), stamp)
         self._tell('', 'Summary', report.summary, stamp)
         for point in list(self.points.values()):
-            if quantities_of(point.channel)[point.quantity].is_measured or not point.unit:
+            if self._quantities(point.channel)[point.quantity].is_measured or not point.unit:
                 continue
             if report.level == Level.STALE and point.quality is Quality.GOOD:
                 self._put(_doubted(point, Quality.STALE))
@@ -125,7 +136,7 @@ class MachineBoard:
         self._tell('', 'Verdict', values.get('verdict', ''), stamp, Quality.NOT_MEASURED)
         for channel in self.channels:
             for key, quantity in (*MEASURED.items(), *WORDS.items()):
-                if (channel, quantity) in self.points and f'{channel}_{key}' in values:
+                if f'{channel}_{key}' in values:
                     told = values[f'{channel}_{key}'] if key in WORDS else (
                         report.number(f'{channel}_{key}') * SI_IN_TOLD.get(key, 1.0))
                     self._tell(channel, quantity, told, stamp, Quality.NOT_MEASURED)
@@ -139,7 +150,7 @@ class MachineBoard:
         touched.pop('', None)
         for channel, stamp_ns in touched.items():
             said: dict[str, list[str]] = {}
-            for name in quantities_of(channel):
+            for name in self._quantities(channel):
                 point = self.points[channel, name]
                 if name != REASON and point.quality not in (Quality.GOOD, Quality.NOT_MEASURED):
                     said.setdefault(point.reason, []).append(name)
@@ -155,7 +166,7 @@ class MachineBoard:
 
     def _add(self, channel: str) -> None:
         """Begin to tell of a channel, or of the machine."""
-        for quantity, known in quantities_of(channel).items():
+        for quantity, known in self._quantities(channel).items():
             quality = Quality.NOT_MEASURED if known.is_measured else Quality.WAITING
             self._put(Point(self.name, channel, quantity, None,
                             unit_of(channel, quantity, plant=self._plant), quality,
@@ -165,7 +176,9 @@ class MachineBoard:
         self, channel: str, quantity: str, value: float | str, stamp_ns: int,
         otherwise: Quality = Quality.UNANSWERED,
     ) -> None:
-        """Put a value, or what it is otherwise where there is none."""
+        """Put a value, or what it is otherwise where there is none; nothing where none is told."""
+        if (channel, quantity) not in self.points:
+            return
         unit = self.points[channel, quantity].unit
         told: float | str | None = None
         if isinstance(value, str):
@@ -202,7 +215,7 @@ class MachineBoard:
         if not is_rejected and report.level != Level.STALE:
             return
         because = report.values.get(f'{channel}_refused_because', Quality.REJECTED.value)
-        for quantity, known in quantities_of(channel).items():
+        for quantity, known in self._quantities(channel).items():
             point = self.points[channel, quantity]
             if not known.is_measured or quantity == 'PredictedZone':
                 continue
@@ -251,7 +264,8 @@ class Board:
             return
         stamp_ns, channels, fields = self._vectors.read(topic, cdr)
         if channels and len(channels) <= MOST_CHANNELS:
-            self._machine(place, now_ns).take_vector(name, stamp_ns, channels, fields)
+            self._machine(place, now_ns, is_plant=name == TOTAL).take_vector(
+                name, stamp_ns, channels, fields)
 
     def _take_report(self, report: Report, now_ns: int) -> None:
         if (machine := self._by_path.get(report.of)) is not None:
@@ -261,10 +275,13 @@ class Board:
             else:
                 machine.take_report(report)
 
-    def _machine(self, place: Speaker, now_ns: int) -> MachineBoard:
+    def _machine(
+        self, place: Speaker, now_ns: int, *, is_plant: bool = False,
+    ) -> MachineBoard:
         machine = self._by_path.get(place.path)
         if machine is None:
-            machine = MachineBoard(place.name, plant=self._plant)
+            machine = MachineBoard(place.name, plant=self._plant,
+                                   quantities=quantities_of_plant if is_plant else quantities_of)
             if len(self.machines) < MOST_MACHINES:
                 self.machines[place.name] = self._by_path[place.path] = machine
         machine.hear(now_ns)

@@ -13,15 +13,22 @@ from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.monitor.verdict import VIBRATION
 from rotorsoil_ros.wire.cdr import Layout
 from rotorsoil_ros.wire.definitions import DIAGNOSTICS, JOINT_STATE, STRING
-from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, NODE_NAME, own_name, OWN_TOPICS
+from rotorsoil_ros.wire.messages import (
+    DIAGNOSTICS_TOPIC,
+    NODE_NAME,
+    own_name,
+    OWN_TOPICS,
+    PLANT_TOPICS,
+)
 from rotorsoil_ros.wire.sensors import JointStateReader
 
-# Topics of a machine that a feed hears: which quantity each tells, and in which of its fields.
-TOLD: Mapping[str, tuple[str, str]] = {
-    'amplitude': ('Amplitude', 'position'), 'phase': ('Phase', 'position'),
-    'amplitude_low': ('AmplitudeLow', 'position'), 'amplitude_high': ('AmplitudeHigh', 'position'),
-    'velocity_rms': ('VelocityRms', 'velocity'), 'residual': ('Residual', 'position')}
-MODEL = 'model'
+# Topics of machines and plants that a feed hears: which quantities each tells, in which fields.
+MODEL, TOTAL = 'model', 'total'
+TOLD: Mapping[str, Mapping[str, str]] = {
+    'amplitude': {'Amplitude': 'position'}, 'phase': {'Phase': 'position'},
+    'amplitude_low': {'AmplitudeLow': 'position'}, 'amplitude_high': {'AmplitudeHigh': 'position'},
+    'velocity_rms': {'VelocityRms': 'velocity'}, 'residual': {'Residual': 'position'},
+    TOTAL: {'Amplitude': 'position', 'VelocityRms': 'velocity'}}
 HEARD = (*TOLD, MODEL)
 MOST_REPORTS = 10_000  # that wait to be read: a minute of fifty machines
 MOST_TOPICS = 10_000
@@ -30,7 +37,7 @@ MOST_TOPICS = 10_000
 @dataclass(frozen=True, slots=True)
 class Speaker:
     """
-    Who speaks: a machine, and the node that answers for it.
+    Who speaks: a machine or a plant, and the node that answers for it.
 
     Of `watcher/house/fan` nobody can tell whether `house` is a plant or the node is called
     `watcher/house`; where it matters the node has its usual name.
@@ -62,11 +69,11 @@ class Speaker:
 
 def places_in(topics: Mapping[str, str]) -> list[Speaker]:
     """Return who answers in a graph, by its topics and their types: whoever has all of ours."""
-    found = [place for topic in topics if topic.endswith('/amplitude_low')
-             and (known := Speaker.of(topic)) is not None for place in [known[0]]]
-    return [place for place in found if all(
-        topics.get(f'/{place.node}/{place.machine}/{name}') == kind
-        for name, kind in OWN_TOPICS.items())]
+    return [known[0] for sign, ours in (('amplitude_low', OWN_TOPICS), (TOTAL, PLANT_TOPICS))
+            for topic in topics
+            if topic.endswith(f'/{sign}') and (known := Speaker.of(topic)) is not None
+            and all(topics.get(f'/{known[0].path}/{name}') == kind
+                    for name, kind in ours.items())]
 
 
 class Taker(Protocol):

@@ -179,3 +179,9 @@ def quantities_of(channel: str) -> Mapping[str, Quantity]:
     housing = Channel.parse(channel).is_housing
     return {name: quantity for name, quantity in OF_CHANNEL.items()
             if housing or not quantity.is_of_housings}
+
+
+def quantities_of_plant(channel: str) -> Mapping[str, Quantity]:
+    """Return what is told of all machines of a plant together."""
+    told = ('Amplitude', 'VelocityRms', 'Reason') if channel else ('State', 'Summary')
+    return {name: quantity for name, quantity in quantities_of(channel).items() if name in told}

@@ -57,8 +57,8 @@ class GraphListener(Node):  # type: ignore[misc]
                   if len(kinds) == 1}
         for place in places_in(topics):
             for name in HEARD:
-                topic = f'/{place.node}/{place.machine}/{name}'
-                if topic not in self._heard:
+                topic = f'/{place.path}/{name}'
+                if topic in topics and topic not in self._heard:
                     self._hear(topic, type_of(name), MODELS if name == MODEL else self._values)
 
     def _hear(self, topic: str, kind: str, profile: QoSProfile) -> None:

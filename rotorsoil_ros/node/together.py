@@ -118,8 +118,9 @@ class Together:
         silent = [name for name in self._names if name not in heard]
         summary = (f'{", ".join(heard)} together' if not silent else
                    f'at least: nothing of {", ".join(silent)}')
-        self._report(self._diagnostics, [Diagnostics(
-            self.name, now_ns, Level.WARN if silent else Level.OK, summary, {})], now_ns)
+        level = Level.OK if not silent else Level.WARN if heard else Level.STALE
+        self._report(self._diagnostics, [Diagnostics(self.name, now_ns, level, summary, {})],
+                     now_ns)
         self._quiet = {name: ticks + 1 for name, ticks in self._quiet.items()}
 
     def _tell(self, found: Shaken, heard: Mapping[str, _Part]) -> None:

@@ -43,6 +43,9 @@ OWN_TOPICS = {
 # The same of a machine beside which sensors stand on the ground.
 GROUND_TOPICS = {'ground/amplitude': JOINT_STATE, 'ground/phase': JOINT_STATE}
 
+# Of a plant, below its name.
+PLANT_TOPICS = {'total': JOINT_STATE, 'beats': DIAGNOSTICS}
+
 ROOT_2 = math.sqrt(2.0)
 
 # Of rcl_interfaces/msg/Log.
@@ -107,8 +110,8 @@ class Topics:
 def own_name(topic: str) -> str:
     """Return what follows the machine's name in a topic of ours; empty of any other."""
     # Of `steady/amplitude` and `amplitude` the longer name is meant.
-    return max((name for name in OWN_TOPICS | GROUND_TOPICS if topic.endswith(f'/{name}')),
-               key=len, default='')
+    return max((name for name in OWN_TOPICS | GROUND_TOPICS | PLANT_TOPICS
+                if topic.endswith(f'/{name}')), key=len, default='')
 
 
 def moduli(prediction: Prediction) -> tuple[FloatArray, FloatArray]:

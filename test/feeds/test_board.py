@@ -10,9 +10,9 @@ from rotorsoil_ros.events import Level
 from rotorsoil_ros.feeds.board import SILENCE_S
 from rotorsoil_ros.feeds.hearsay import HEARD, places_in, Speaker
 from rotorsoil_ros.feeds.points import OF_CHANNEL, Quality, quantities_of, unit_of
-from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, OWN_TOPICS
+from rotorsoil_ros.wire.messages import DIAGNOSTICS_TOPIC, OWN_TOPICS, PLANT_TOPICS
 
-from plants import Plant, RUNNING, SECOND, START
+from plants import Plant, RUNNING, SECOND, START, totals
 
 X = Channel('bearing_1', 'housing', 'x')
 PREDICTED = [name for name, quantity in OF_CHANNEL.items()
@@ -55,6 +55,9 @@ def test_who_answers_has_every_topic_of_ours_and_nobody_else_does():
     assert places_in({**ours, **other}) == [Speaker('hall/watcher', 'fan')]
     del ours['/hall/watcher/fan/residual']
     assert places_in(ours) == []
+    plant = {f'/rotorsoil/house/{name}': kind for name, kind in PLANT_TOPICS.items()}
+    assert places_in({**plant, '/bill/total': 'sensor_msgs/msg/JointState'}) == [
+        Speaker('rotorsoil', 'house')]
 
 
 def test_every_value_of_every_channel_is_there_before_the_first_speed(plant, machine):
@@ -233,6 +236,23 @@ def test_two_halls_or_plants_with_a_fan_each_are_told_apart(machine, first, seco
     one.board.refresh(SECOND)
     states = {name: seen.points['', 'State'].value for name, seen in one.board.machines.items()}
     assert states == dict(zip(names, ('OK', 'STALE'), strict=True))
+
+
+def test_what_machines_of_a_plant_do_together_is_told_of_the_plant(plant):
+    board, turning = plant.board, Channel('block', '', 'rx')
+    totals(plant.inbox, 'house', 1.0, {X: (3e-6, 2e-3), turning: (4e-6, 5e-3)}, Level.WARN)
+    board.refresh(SECOND)
+    house = board.machines['house'].points
+    told = {(*key, point.value, point.quality) for key, point in house.items()
+            if point.quantity != 'Reason'}
+    assert told == {
+        (X, 'Amplitude', 3e-6, Quality.GOOD), (X, 'VelocityRms', 2e-3, Quality.GOOD),
+        (turning, 'Amplitude', 4e-6, Quality.GOOD), ('', 'State', 'WARN', Quality.GOOD),
+        ('', 'Summary', 'at least', Quality.GOOD)}
+    totals(plant.inbox, 'house', 2.0, {}, Level.STALE)  # nobody is heard
+    board.refresh(2 * SECOND)
+    seen = board.machines['house'].points[X, 'VelocityRms']
+    assert (seen.value, seen.quality, seen.stamp_ns) == (2e-3, Quality.STALE, START + SECOND)
 
 
 @pytest.mark.parametrize('topic', ['/rotorsoil/fan/amplitude', '/rotorsoil/fan/model',

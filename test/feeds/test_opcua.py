@@ -17,7 +17,7 @@ from rotorsoil_ros.feeds.opcua import MOST_KEPT, OpcUaOutlet, OpcUaSettings
 from rotorsoil_ros.feeds.points import Quality
 
 from brokers import certified
-from plants import Hands, Plant, RUNNING, Running, SECOND, START, until
+from plants import Hands, Plant, RUNNING, Running, SECOND, START, totals, until
 
 ANYWHERE = 'opc.tcp://127.0.0.1:0'
 X = Channel('bearing_1', 'housing', 'x')
@@ -149,12 +149,18 @@ def test_a_machine_that_comes_later_is_there_and_one_with_another_case_is_anothe
     asyncio.run(look())
 
 
-def test_machine_of_a_plant_stands_below_it(plant, machine, address):
+@pytest.mark.parametrize('which_first', [1, -1])
+def test_machine_of_a_plant_stands_below_it(plant, machine, address, which_first):
     async def look():
         async with client(address) as reader:
-            fan = Plant(machine, name='house/fan', inbox=plant.inbox)
-            fan.turns(1.0, RUNNING)
-            await wait_for(reader, f'house/fan/{X}/Amplitude', has(Quality.GOOD))
+            for path, adds in [
+                    (f'house/{X}/VelocityRms', lambda: totals(plant.inbox, 'house', 1.0,
+                                                             {X: (3e-6, 2e-3)})),
+                    (f'house/fan/{X}/Amplitude', lambda: Plant(
+                        machine, name='house/fan', inbox=plant.inbox).turns(1.0, RUNNING)),
+                    ][::which_first]:
+                adds()
+                await wait_for(reader, path, has(Quality.GOOD))
             index = await reader.get_namespace_index(NAMESPACE)
             browsed = await reader.nodes.objects.get_child(
                 [f'{index}:{name}' for name in ('RotorSoil', 'house', 'fan', X, 'Amplitude')])

@@ -85,6 +85,20 @@ def test_two_halls_with_a_fan_each_are_heard_and_another_domain_is_not(
         apart.close()
 
 
+def test_what_the_machines_of_a_plant_do_together_is_heard_of_the_plant(graph, bench, ears):
+    bench.active('fan_house', fan_house__case='fan_house')
+    total = bench.hear('/rotorsoil/fan_house/total')
+    bench.speaker('/fan_house/fan_1/joint_states')(joint_state([150.0], stamp=STAMP))
+    housing = Channel('fan_1_fan_end', 'housing', 'x')
+    graph.until(lambda: (told := ears.point('fan_house', housing, 'VelocityRms')) is not None
+                and told.quality is Quality.GOOD, 'the total')
+    told = ears.point('fan_house', housing, 'VelocityRms')
+    graph.until(lambda: total, 'the same by itself')
+    assert told.value == total[0].velocity[list(total[0].name).index(housing)] > 0.0
+    graph.until(lambda: ears.point('fan_house', '', 'State').value == 'WARN', 'that one is silent')
+    assert ears.board.machines.keys() == {'fan_house', 'fan_house/fan_1', 'fan_house/fan_2'}
+
+
 @pytest.fixture
 def feeding():
     """Return what starts a feed in a process of its own and waits until it tells."""

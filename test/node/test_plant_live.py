@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
@@ -89,13 +89,15 @@ def test_each_machine_answers_its_part_and_the_total_adds_them(bench, cache, nam
         [float(values[key]) for key in ('period_s', 'lowest_m', 'highest_m')],
         [2.0 * np.pi / 10.0, beat.lowest, beat.highest], rtol=1e-5)
 
-    def told(summary):
-        return any(status.message == summary for status in statuses(said))
+    def told(summary, level):
+        return any((status.message, status.level) == (summary, level)
+                   for status in statuses(said))
 
-    bench.graph.until(lambda: told(f'{", ".join(names)} together'), 'who is in the total')
+    bench.graph.until(lambda: told(f'{", ".join(names)} together', DiagnosticStatus.OK),
+                      'who is in the total')
     # Neither is heard any more; then one is, by itself.
-    bench.graph.until(lambda: told(f'at least: nothing of {", ".join(names)}'),
-                      'that all are silent')
+    bench.graph.until(lambda: told(f'at least: nothing of {", ".join(names)}',
+                                   DiagnosticStatus.STALE), 'that all are silent')
     first(joint_state([151.0], stamp=STAMP + 60 * 10**9))
     bench.graph.until(lambda: stamp_ns(total[-1]) > STAMP + 7, 'a total of one')
     np.testing.assert_allclose(total[-1].position, parts[0][-1].position, rtol=1e-12)
