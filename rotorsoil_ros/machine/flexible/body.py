@@ -16,8 +16,9 @@ SEAT, CONTACT, PROBE = 'seat', 'contact', 'probe'
 # How the ground stands below several contacts; GROUNDED below a body that its own stiffness holds.
 WINKLER, GREEN, EACH, GROUNDED = 'winkler', 'green', 'each', 'grounded'
 
-# A residual may be negative by so much of its diagonal: six printed digits.
-_ROUND_OFF = 1e-5
+# A residual may be negative by so much of its diagonal, six printed digits; and by so much of the
+# whole flexibility: where all modes are kept, the highest leave no more digits to the lowest.
+_ROUND_OFF, _OF_WHOLE = 1e-5, 1e-6
 # Flexibility of less than this share of the whole is round-off.
 _NO_SHAPE = 1e-11
 
@@ -335,7 +336,7 @@ def massless(residual: FloatArray, size: FloatArray) -> FloatArray:
     """
     values, vectors = scipy.linalg.eigh(0.5 * (residual + residual.T))
     largest, whole = float(np.abs(values).max(initial=0.0)), float((size**2).max(initial=0.0))
-    if values.min(initial=0.0) < -_ROUND_OFF * largest - _NO_SHAPE * whole:
+    if values.min(initial=0.0) < -_ROUND_OFF * largest - _OF_WHOLE * whole:
         raise RotorSoilError(f'residual must not be negative in any direction, got '
                              f'{values.min():.3g} m/N beside {largest:.3g} m/N')
     some = values > _NO_SHAPE * whole

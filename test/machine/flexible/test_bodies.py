@@ -75,9 +75,11 @@ def test_raft_of_modes_and_residual_is_the_direct_solution(raft):
     assert off(support.standing(omega).receptance, exact).max() < 1.8e-3
 
 
-def test_frame_is_its_matrices_solved_at_once(elements):
+# As far above its modes as 1e6 rad/s their frequencies, and what they leave out, are round-off.
+@pytest.mark.parametrize('highest, within', [(1e4, 1e-9), (1e6, 1e-6)])
+def test_frame_is_its_matrices_solved_at_once(elements, highest, within):
     """Dense oracle: (K (1 + i eta) - w^2 M + S)^-1 over all 112 motions."""
-    body = replace(elements.body(1e4, loss=LOSS), bed='each')
+    body = replace(elements.body(highest, loss=LOSS), bed='each')
     stiffness, mass = elements.stiffness.toarray(), elements.mass.toarray()
     picked = elements.pick.toarray()
     seats, contacts = picked[body.of_kind(SEAT)], picked[body.contacts]
@@ -88,7 +90,7 @@ def test_frame_is_its_matrices_solved_at_once(elements):
             np.eye(4), soil) @ contacts
         exact.append(seats @ np.linalg.solve(total, seats.T))
     found = frame_support(body).standing(SOME).receptance
-    assert off(found, np.array(exact)).max() < 1e-9
+    assert off(found, np.array(exact)).max() < within
 
 
 def test_held_contacts_are_a_fixed_base(elements):
