@@ -72,6 +72,8 @@ class Faults:
         Place of the machine in the file of a plant, below which its own keys stand.
     rotor_file : Path or None
         The file that describes its rotor, where that is another one.
+    seats : tuple of str
+        On which the bearings of all machines of a plant stand; none of one alone.
 
     """
 
@@ -80,6 +82,7 @@ class Faults:
     found: list[InputError] = field(default_factory=list)
     under: Place = ()
     rotor_file: Path | None = None
+    seats: tuple[str, ...] = ()
 
     def attempt(self, build: Callable[[], T]) -> T | None:
         """Return what is built, or keep what is wrong with it for later, and return None."""

@@ -169,10 +169,6 @@ class GroundEntries:
     def _refuse_beside_seats(self) -> None:
         """Raise an InputError at what receptances of seats hold already."""
         entries, support = self.faults.entries, self.faults.entries.support
-        if self.faults.under:
-            raise self.faults.error('support', 'model', problem=(
-                f'must be one of blocks on ground where several machines share them, got '
-                f'{RECEPTANCE}, which is of the seats of one machine'))
         if entries.foundations:
             names = ', '.join(block.name for block in entries.foundations)
             raise self.faults.error('foundations', problem=(

@@ -68,8 +68,9 @@ class SupportFiles:
 
     def _seats(self, speed_range: tuple[float, float]) -> SeatReceptance:
         file, bearings = self.faults.entries.support.file, self.faults.entries.rotor.bearings
-        return _receptance(self.faults.path.parent / self._named(file), self._text(file),
-                           tuple(bearing.seat or bearing.name for bearing in bearings),
+        seats = self.faults.seats or tuple(
+            bearing.seat or bearing.name for bearing in bearings)
+        return _receptance(self.faults.path.parent / self._named(file), self._text(file), seats,
                            speed_range)
 
     def _named(self, file: str | None) -> str:

@@ -159,10 +159,10 @@ class PlantEntries:
         """Return what the file says of one machine and of all that it stands on."""
         entries, machine, rotor = self.entries, self.entries.machines[index], self.rotors[index]
         block, of_file = machine.foundation, isinstance(machine.rotor, RotorOfFile)
-        # The blocks of another file are not here.
+        # The blocks of another file are not here; where there are none it means nothing.
         bearings = [bearing.model_copy(update={'foundation': (
-            block or bearing.foundation if of_file else bearing.foundation or block)})
-            for bearing in rotor.bearings]
+            block or (bearing.foundation if entries.foundations else None) if of_file
+            else bearing.foundation or block)}) for bearing in rotor.bearings]
         height = machine.place.z if machine.place.z is not None else rotor.shaft_height
         common = {key: getattr(entries, key) for key in type(entries).model_fields
                   if key in Document.model_fields}
@@ -176,7 +176,14 @@ class PlantEntries:
         rotor = self.entries.machines[index].rotor
         return Faults(
             self.path, self._document(index), under=('machines', index), rotor_file=(
-                self.path.parent / rotor.file if isinstance(rotor, RotorOfFile) else None))
+                self.path.parent / rotor.file if isinstance(rotor, RotorOfFile) else None),
+            seats=self._seats)
+
+    @cached_property
+    def _seats(self) -> tuple[str, ...]:
+        """Which seats the bearings of all machines stand on, as `renamed` calls them."""
+        return tuple(bearing.seat or f'{name}_{bearing.name}' for name, rotor in zip(
+            self.names, self.rotors, strict=True) for bearing in rotor.bearings)
 
     def _rated(self, index: int) -> float:
         """Return the speed at which a machine runs while another is looked at [rpm]."""
@@ -372,13 +379,15 @@ def _rotor(
 _parsed = lru_cache(maxsize=16)(document.parse)
 
 
-def written_out(machine: Mapping[str, Any], files: Mapping[str, str]) -> Mapping[str, Any]:
+def written_out(
+    machine: Mapping[str, Any], files: Mapping[str, str], *, on_blocks: bool,
+) -> Mapping[str, Any]:
     """Return the rotor of a machine as its document says it, or as the file says that it names."""
     rotor: Mapping[str, Any] = machine['rotor']
     if rotor.get('file') not in files:
         return rotor
     own: dict[str, Any] = document.parse(files[rotor['file']], source=rotor['file'])['rotor']
-    if machine.get('foundation') is not None:
+    if machine.get('foundation') is not None or not on_blocks:
         for bearing in own['bearings']:
             bearing.pop('foundation', None)
     return {key: value for key, value in own.items()

@@ -147,7 +147,8 @@ def write_case(found: Identification, target: Path) -> None:
     holder['unbalances'] = [entry | {'disc': entry['disc'].removeprefix(before)} for entry in (
         *(entry for entry in kept if entry is not None), *entries.values())]
     for machine in machines:
-        machine['rotor'] = written_out(machine, found.case.files)
+        machine['rotor'] = written_out(
+            machine, found.case.files, on_blocks=bool(content.get('foundations')))
     for entry in (content.get('support'), *(content.get('foundations') or [])):
         for key in ('file', 'stiffness_file'):
             if isinstance(entry, dict) and isinstance(entry.get(key), str):

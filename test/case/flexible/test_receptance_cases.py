@@ -8,11 +8,13 @@ import pytest
 import yaml
 
 from rotorsoil_ros.case.machine import Machine
+from rotorsoil_ros.case.plant.together import Plant
 from rotorsoil_ros.case.summary import derived_quantities, warnings
 from rotorsoil_ros.cli import main
 from rotorsoil_ros.cli.pictures import _ground_figures
 from rotorsoil_ros.errors import InputError
 from rotorsoil_ros.figures.response import support
+from rotorsoil_ros.units import hz_to_rad_s
 
 BLOCK = {
     **FAN, 'name': 'block', 'support': {'model': 'cone'},
@@ -178,16 +180,51 @@ def test_a_seat_may_have_a_name_of_its_own(tables):
     assert machine.model.channels[0] == 'drive_end_journal_x'
 
 
-def test_several_machines_share_no_table(tables):
-    plant = {key: value for key, value in BLOCK.items()
-             if key not in ('rotor', 'unbalances', 'foundations')}
-    plant |= {'support': {'model': 'receptance', 'file': 'block_seats.csv'}, 'source': 'a',
-              'machines': [{'name': name, 'place': {'x': x, 'y': 0.0}, 'rated_rpm': 1000,
-                            'rotor': BLOCK['rotor']} for name, x in (('a', 0.0), ('b', 2.0))]}
-    (tables / 'plant.yaml').write_text(yaml.safe_dump(plant))
-    with pytest.raises(InputError, match=r'support\.model: must be one of blocks on ground '
-                                         'where several machines share them, got receptance'):
-        loaded(tables, 'plant')
+@pytest.fixture(scope='module')
+def house(tables):
+    """Return two fans of another file, turned against each other, on a block and on its seats."""
+    (tables / 'rotor.yaml').write_text(yaml.safe_dump(BLOCK | {'rotor': BLOCK['rotor'] | {
+        'bearings': [one | {'foundation': 'block'} for one in BLOCK['rotor']['bearings']]}}))
+    plant = {key: value for key, value in BLOCK.items() if key not in ('rotor', 'unbalances')}
+    plant['machines'] = [{
+        'name': name, 'place': {'x': x, 'y': -0.75, 'heading': heading}, 'rated_rpm': rpm,
+        'rotor': {'file': 'rotor.yaml'}, 'unbalances': BLOCK['unbalances']}
+        for name, x, heading, rpm in (('a', -0.7, 0.0, 1480.0), ('b', 0.7, 0.4, 990.0))]
+    (tables / 'house.yaml').write_text(yaml.safe_dump(plant))
+    assert main(['seats', str(tables / 'house.yaml'), '--hz', '1:60:119', '-o',
+                 str(tables / 'house_seats.csv')]) == 0
+    (tables / 'house_table.yaml').write_text(yaml.safe_dump(plant | {
+        'foundations': [], 'support': {'model': 'receptance', 'file': 'house_seats.csv'}}))
+    return tuple(Plant.load(tables / f'{name}.yaml', cache_directory=tables / 'cache')
+                 for name in ('house', 'house_table'))
+
+
+def test_a_plant_on_its_seats_is_the_plant_on_its_foundation(house):
+    own, other = house
+    assert other.seats == own.seats
+    for name, machine in other.machines.items():
+        rpm = np.linspace(300.0, 1800.0, 50)
+        answers = own.machines[name].response(rpm=rpm), machine.response(rpm=rpm)
+        for channel in machine.model.channels:
+            one, two = (answer[channel].displacement for answer in answers)
+            assert np.abs(two - one).max() < 1e-6 * np.abs(one).max()
+        one, two = (found.campbell(rpm=[300.0]).eigenvalue[0] for found in (
+            own.machines[name], machine))
+        known = one[one.imag < hz_to_rad_s(60.0)]
+        assert len(known) >= 6
+        np.testing.assert_allclose(two, known, rtol=1e-5)
+    together, apart = own.shaken(), other.shaken()
+    names = tuple(map(str, apart.channels))
+    np.testing.assert_allclose(apart.own_rms, together[names].own_rms, rtol=1e-6)
+
+
+def test_a_seat_of_another_machine_that_the_table_lacks_is_told_once(house, tables):
+    with pytest.raises(InputError) as error:
+        loaded(tables, 'house_table', 'source=a', 'support.file=block_seats.csv')
+    [line] = str(error.value).splitlines()
+    assert line.endswith("column 'fan_1_b1_x__fan_1_b1_x_re' is not known; needed are omega_rad_s "
+                         'or hz, and a_fan_1_b1_x__a_fan_1_b1_x_re and _im of the seats '
+                         'a_fan_1_b1, a_fan_1_b2, b_fan_1_b1, b_fan_1_b2')
 
 
 def test_orders_beyond_the_table_have_no_answer(tables):
