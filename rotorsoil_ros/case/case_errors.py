@@ -1,6 +1,6 @@
 """Where in a case file a fault lies, and how it is told in one line."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -32,11 +32,11 @@ def message(path: Path, place: Place, problem: str) -> str:
 
 
 class CaseError(InputError):
-    """What is wrong at one key of a file, in one line."""
+    """What is wrong at one key of a file, in one line; `under` a place of the case it stands."""
 
-    def __init__(self, path: Path, place: Place, problem: str) -> None:
+    def __init__(self, path: Path, place: Place, problem: str, *, under: Place = ()) -> None:
         super().__init__(message(path, place, problem))
-        self.place = place
+        self.place = (*under, *place)
 
 
 def place_of(error: InputError) -> Place:
@@ -45,14 +45,19 @@ def place_of(error: InputError) -> Place:
 
 
 def validated(
-    kind: type[M], path: Path, content: object, *, under: Place = (),
+    kind: type[M], path: Path, content: object, rotor_files: Mapping[Place, Path],
 ) -> tuple[M | None, list[InputError]]:
-    """Return what is said at a key as entries, or all that is wrong with their form."""
+    """Return a document as entries, or all that is wrong with their form."""
+    def of(place: Place, problem: str) -> InputError:
+        under = place[:2]
+        if under in rotor_files and place[2:3] == ('rotor',):
+            return CaseError(rotor_files[under], place[2:], problem, under=under)
+        return CaseError(path, place, problem)
+
     try:
         return kind.model_validate(content), []
     except ValidationError as error:
-        return None, [CaseError(path, (*under, *place), problem)
-                      for place, problem in faults(error)]
+        return None, [of(place, problem) for place, problem in faults(error)]
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,7 @@ class Faults:
         """Return the error to raise at a key."""
         if self.rotor_file is not None and place[:1] == ('rotor',):
             # A key of that file is none of this one.
-            return InputError(message(self.rotor_file, place, problem))
+            return CaseError(self.rotor_file, place, problem, under=self.under)
         if place and place[0] in _OF_MACHINE:
             place = (*self.under, *place)
         return CaseError(self.path, place, problem)

@@ -24,7 +24,7 @@ from rotorsoil_ros.case.entries.support_file import SupportFiles, Tables
 from rotorsoil_ros.case.journal_entries import floated, Journal, JournalEntries
 from rotorsoil_ros.case.plant.berth import Berth
 from rotorsoil_ros.case.plant.entries import PlantDocument
-from rotorsoil_ros.case.plant.machines import case_among
+from rotorsoil_ros.case.plant.machines import PlantEntries, with_rotors
 from rotorsoil_ros.case.rotor_entries import RotorEntries, Unbalances
 from rotorsoil_ros.case.zone_limits import ISO_10816_3, USUAL_GROUP, ZoneLimits, zones_of
 from rotorsoil_ros.channel import Channel, DOFS
@@ -209,26 +209,32 @@ def case_of(
     """
     texts = dict(files or {})
     schema_of = PlantDocument if 'machines' in content else schema.Document
+    whole, rotor_files, _ = with_rotors(path, content, texts)
 
     def read(
-        content: dict[str, Any], mended: frozenset[Place] = frozenset(),
+        whole: dict[str, Any], mended: frozenset[Place] = frozenset(),
     ) -> tuple[Case | None, list[InputError]]:
-        entries, found = validated(schema_of, path, content)
+        # Where what names a file is mended it is read only now.
+        whole, more, missing = with_rotors(path, whole, texts)
+        files = rotor_files | more
+        entries, found = validated(schema_of, path, whole, files)
+        if missing:
+            return None, [*found, *missing]
 
         def build(told: Faults) -> Case | None:
             return _Builder(told, content, texts, cache_directory, mended).case()
 
         if isinstance(entries, PlantDocument):
-            return case_among(path, entries, texts, build)
+            return PlantEntries(path, entries, files).case(build)
         if not isinstance(entries, schema.Document):
             return None, found
         told = Faults(path, entries)
         return build(told), told.found
 
-    case, found = read(content)
+    case, found = read(whole)
     if case is None or found:
         raise InputError('\n'.join(map(str, all_faults(
-            schema_of, content, found, lambda *mended: read(*mended)[1]))))
+            schema_of, whole, found, lambda *mended: read(*mended)[1]))))
     return case
 
 
@@ -314,7 +320,7 @@ class _Builder:
 
     def _journals(self) -> JournalEntries:
         return JournalEntries(self.faults, cache.directory(self.cache_directory),
-                              not any(place[0] in _CARRIED for place in self.mended))
+                              not any({*_CARRIED} & {*place} for place in self.mended))
 
     def _refuse_bursting_speed(self, rotor: Rotor) -> None:
         """Raise an InputError at a speed that no shaft of this diameter survives."""

@@ -2,22 +2,18 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from itertools import combinations
 import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING, TypeAlias
 
 from rotorsoil_ros.case import document
-from rotorsoil_ros.case.case_errors import CaseError, Faults, validated
+from rotorsoil_ros.case.case_errors import CaseError, Faults
+from rotorsoil_ros.case.entries.entry import Place
 from rotorsoil_ros.case.entries.sensors import sensors_of
 from rotorsoil_ros.case.plant.berth import Berth, beside, refuse_seats_elsewhere, renamed
-from rotorsoil_ros.case.plant.entries import (
-    MachineEntry,
-    PlantDocument,
-    PlantRotor,
-    RotorOfFile,
-)
+from rotorsoil_ros.case.plant.entries import MachineEntry, PlantDocument, PlantRotor
 from rotorsoil_ros.case.schema import Document, FoundationEntry, SensorsEntry
 from rotorsoil_ros.channel import Channel, DOFS
 from rotorsoil_ros.errors import InputError
@@ -47,15 +43,21 @@ class PlantEntries:
     path : Path
         The file.
     entries : PlantDocument
-        What it says.
-    rotors : tuple of PlantRotor
-        Of every machine, those of other files read.
+        What it says, with the rotors of other files in it.
+    rotor_files : mapping of place to Path
+        Where these come from, by the place of their machine.
 
     """
 
     path: Path
     entries: PlantDocument
-    rotors: tuple[PlantRotor, ...]
+    rotor_files: Mapping[Place, Path]
+
+    @cached_property
+    def rotors(self) -> tuple[PlantRotor, ...]:
+        """What turns, of every machine."""
+        return tuple(machine.rotor for machine in self.entries.machines
+                     if isinstance(machine.rotor, PlantRotor))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -158,7 +160,7 @@ class PlantEntries:
     def _document(self, index: int, *, sensors: SensorsEntry | None = None) -> Document:
         """Return what the file says of one machine and of all that it stands on."""
         entries, machine, rotor = self.entries, self.entries.machines[index], self.rotors[index]
-        block, of_file = machine.foundation, isinstance(machine.rotor, RotorOfFile)
+        block, of_file = machine.foundation, ('machines', index) in self.rotor_files
         # The blocks of another file are not here; where there are none it means nothing.
         bearings = [bearing.model_copy(update={'foundation': (
             block or (bearing.foundation if entries.foundations else None) if of_file
@@ -173,11 +175,9 @@ class PlantEntries:
             'sensors': sensors or SensorsEntry()})
 
     def _faults(self, index: int) -> Faults:
-        rotor = self.entries.machines[index].rotor
-        return Faults(
-            self.path, self._document(index), under=('machines', index), rotor_file=(
-                self.path.parent / rotor.file if isinstance(rotor, RotorOfFile) else None),
-            seats=self._seats)
+        under = ('machines', index)
+        return Faults(self.path, self._document(index), under=under,
+                      rotor_file=self.rotor_files.get(under), seats=self._seats)
 
     @cached_property
     def _seats(self) -> tuple[str, ...]:
@@ -226,10 +226,7 @@ class PlantEntries:
             found += [self._error('machines', second, key, problem=problem)
                       for key, problem in self._twice(first, second)]
         for index in range(0 if found else len(self.names)):
-            try:
-                self._refuse_rated_beyond(index)
-            except InputError as error:
-                found.append(error)
+            found += self._rated_beyond(index)
         return found
 
     def _faults_of(
@@ -246,7 +243,7 @@ class PlantEntries:
         rotor = self.rotors[index]
         if machine.place.z is None and rotor.shaft_height is None:
             found.append(('place.z', 'is missing, and so is rotor.shaft_height'))
-        elif (not isinstance(machine.rotor, RotorOfFile)
+        elif (('machines', index) not in self.rotor_files
                 and None not in (machine.place.z, rotor.shaft_height)
                 and machine.place.z != rotor.shaft_height):
             found.append(('place.z', f'must be rotor.shaft_height, {rotor.shaft_height:g} m, or '
@@ -309,74 +306,67 @@ class PlantEntries:
                                    'shafts cannot lie in one place'))
         return found
 
-    def _refuse_rated_beyond(self, index: int) -> None:
-        """Raise an InputError for a rated speed at which the machine is not looked at."""
+    def _rated_beyond(self, index: int) -> Iterator[InputError]:
+        """Yield that a machine is not looked at where it runs while others are."""
         (low, high), rated = self._speed_range(index), self._rated(index)
         machine = self.entries.machines[index]
         if not machine.idle and 0.0 <= low < high and not low <= rated <= high:
-            raise self._error('machines', index, 'ratio' if machine.ratio else 'rated_rpm',
-                              problem=('must lie in the speed range of the machine, '
-                                       f'{low:g} to {high:g} rpm, got {rated:g}'))
+            key = 'ratio' if machine.ratio else 'rated_rpm'
+            yield self._error('machines', index, key, problem=(
+                'must lie in the speed range of the machine, '
+                f'{low:g} to {high:g} rpm, got {rated:g}'))
 
 
-def case_among(
-    path: Path, entries: PlantDocument, files: dict[str, str], build: Build,
-) -> tuple['Case | None', list[InputError]]:
+def with_rotors(
+    path: Path, content: dict[str, Any], files: dict[str, str],
+) -> tuple[dict[str, Any], dict[Place, Path], list[InputError]]:
     """
-    Return the machine that a document names as its source, among its neighbours.
+    Return a document with the rotors in it that it says are in other files.
 
     Parameters
     ----------
     path : Path
         What errors name; files that the document names lie beside it.
-    entries : PlantDocument
-        The document.
+    content : dict
+        The document; stays as it is.
     files : dict of str to str
         What such files say; those that are read are added.
-    build : callable
-        From what is said of one machine to its case, as if it stood there alone.
 
     Returns
     -------
-    case, faults : Case or None, list of InputError
-        The machine, or all that is wrong with any of them.
+    content, rotor_files, faults : dict, dict of place to Path, list of InputError
+        The document, where its rotors come from by the place of their machine, and which of
+        them were not found.
 
     """
-    rotors, wrong = list[PlantRotor](), list[InputError]()
-    for index, machine in enumerate(entries.machines):
-        rotor, found = _rotor(path, index, machine, files)
-        wrong += found
-        if rotor is not None:
-            rotors.append(rotor)
-    if wrong:
-        return None, wrong
-    return PlantEntries(path, entries, tuple(rotors)).case(build)
+    machines = content.get('machines')
+    if not isinstance(machines, list):
+        return content, {}, []
+    whole, wrong, found = list[Any](), list[InputError](), dict[Place, Path]()
+    for index, machine in enumerate(machines):
+        rotor = machine.get('rotor') if isinstance(machine, dict) else None
+        if isinstance(rotor, dict) and rotor.keys() == {'file'} and isinstance(rotor['file'], str):
+            try:
+                machine = machine | {'rotor': _rotor(path, index, rotor['file'], files)}
+                found['machines', index] = path.parent / rotor['file']
+            except InputError as error:
+                wrong.append(error)
+        whole.append(machine)
+    return content | {'machines': whole}, found, wrong
 
 
-def _rotor(
-    path: Path, index: int, machine: MachineEntry, files: dict[str, str],
-) -> tuple[PlantRotor | None, list[InputError]]:
-    """Return the rotor of a machine: its own, or that of another case file."""
-    if not isinstance(machine.rotor, RotorOfFile):
-        return machine.rotor, []
-    name, file = machine.rotor.file, path.parent / machine.rotor.file
-    try:
-        if name not in files:
-            document.read(file)  # says what is wrong with it as a file
-            files[name] = file.read_text(encoding='utf-8')
-        content = _parsed(files[name], source=str(file))
-    except InputError as error:
-        return None, [error]
-    if not isinstance(content, dict) or not isinstance(content.get('rotor'), dict):
-        return None, [CaseError(path, ('machines', index, 'rotor', 'file'), (
-            f'must be the case file of a machine with its rotor, got {name}'))]
-    rotor, wrong = validated(PlantRotor, file, content['rotor'], under=('rotor',))
-    # A key of that file is none of this one.
-    return rotor, [InputError(str(error)) for error in wrong]
-
-
-# Read and never changed: where a plant is at fault it is tried in hundreds of ways.
-_parsed = lru_cache(maxsize=16)(document.parse)
+def _rotor(path: Path, index: int, name: str, files: dict[str, str]) -> dict[str, Any]:
+    """Return the rotor that another case file describes."""
+    file = path.parent / name
+    if name not in files:
+        document.read(file)  # says what is wrong with it as a file
+        files[name] = file.read_text(encoding='utf-8')
+    content = document.parse(files[name], source=str(file))
+    rotor = content.get('rotor') if isinstance(content, dict) else None
+    if not isinstance(rotor, dict) or 'file' in rotor:
+        raise CaseError(path, ('machines', index, 'rotor', 'file'), (
+            f'must be the case file of a machine with its rotor, got {name}'))
+    return rotor
 
 
 def written_out(

@@ -304,9 +304,14 @@ def test_fault_of_a_rotor_is_told_once_and_of_its_own_file(tmp_path):
     rotor.write_text(FAN.read_text().replace('mass: 320.0', 'mass: -3'))
     assert faults(path, 'source=fan_1') == [
         f'{rotor}: rotor.discs.1.mass: must be >= 0 kg and finite, got -3']
-    rotor.write_text(FAN.read_text().replace('mass: 320.0', 'mass: heavy'))
-    assert faults(path, 'source=fan_1') == [
-        f"{rotor}: rotor.discs.1.mass: must be a finite number in kg, got 'heavy'"]
+    rotor.write_text(FAN.read_text().replace('mass: 320.0', 'mass: heavy').replace(
+        'position: 0.25', 'position: 9.0'))
+    # The second of its faults shows where the first is mended.
+    assert faults(path, 'source=fan_1', 'foundations.0.mass=-1') == [
+        f"{rotor}: rotor.discs.1.mass: must be a finite number in kg, got 'heavy'",
+        f'{rotor}: rotor.bearings.0.position: position of drive_end must be on the shaft, 0 to '
+        '1.7 m, got 9',
+        'foundations.0.mass: must be >= 0 kg and finite, got -1']
 
 
 def test_all_machines_are_told_what_is_wrong_with_them_at_once(tmp_path):
