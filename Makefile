@@ -32,6 +32,7 @@ demo: $(INSTALLED)
 test: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/python -c 'import amqtt, rerun'  # without them tests are skipped: here they are installed
 	$(BIN)/python -m pytest $(SPREAD)
 
 docs: $(DOCUMENTED)

@@ -10,7 +10,7 @@ from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from rotorsoil_ros.domain import own_domain
 
@@ -23,7 +23,6 @@ AnyNode = TypeVar('AnyNode', bound=Node)
 # For what hangs: a test is not about how fast something is.
 DEADLINE_S = 600.0
 RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-LATCHED_INPUT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SPIN_ONCE_S = 0.05
 
 
