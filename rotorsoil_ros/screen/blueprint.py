@@ -95,7 +95,8 @@ def _velocity(shown: Shown, axis: str) -> rrb.View:
     contents = [f'{trend.entity}/velocity/**' for trend in shown.housings
                 if trend.channel.axis == axis]
     direction = f'along {axis}' if shown.case.rotor.is_upright else DIRECTIONS[axis]
-    return _series(f'Housings {direction}, velocity [mm/s rms]',
+    what = 'velocity' if shown.case.berth is None else 'own part of the velocity'
+    return _series(f'Housings {direction}, {what} [mm/s rms]',
                    [*contents, f'{shown.entity("limits", axis)}/**'])
 
 

@@ -57,9 +57,9 @@ class Bode:
         self._amplitude = [
             _amplitude_axis(MICRO * float(np.nanmax(column, initial=0.0)))
             for column in response.T]
-        self._trails = {trend.channel: Trail(number) for number, trend in enumerate(shown)}
-        for number, trend in enumerate(shown):
-            self._draw_frame(trend, self._amplitude[number])
+        self._trails = {trend.channel: Trail(trend) for trend in shown}
+        for trend in shown:
+            self._draw_frame(trend, self._amplitude[trend.column])
         self.predict(predictor)
 
     @staticmethod
@@ -77,13 +77,13 @@ class Bode:
 
     def predict(self, predictor: Predictor | None) -> None:
         """Draw the prediction of an unbalance, or none."""
-        for number, trend in enumerate(self._trends):
+        for trend in self._trends:
             lines: list[FloatArray] = []
             if predictor is not None:
                 speed = resolved_speeds(predictor)
-                vector = answer(predictor, speed)[:, number]
+                vector = answer(predictor, speed)[:, trend.column]
                 x = self._speed.place(rad_s_to_rpm(speed))
-                lines = curve(x, self._amplitude[number].place(MICRO * np.abs(vector)))
+                lines = curve(x, self._amplitude[trend.column].place(MICRO * np.abs(vector)))
                 lines += curve(x, self._phase.place(np.degrees(np.angle(vector))),
                                largest_step=FLIP / 12.0)
             self._recording.still(f'{self.path(self._entity, trend)}/predicted', rr.LineStrips2D(
@@ -91,20 +91,23 @@ class Bode:
 
     def band(self, envelope: Envelope | None) -> None:
         """Draw between which amplitudes the predictions lie, or nothing."""
-        for number, trend in enumerate(self._trends):
+        for trend in self._trends:
             lines: list[FloatArray] = []
             if envelope is not None:
                 x = self._speed.place(rad_s_to_rpm(envelope.speed))
                 for side in (envelope.low, envelope.high):
-                    lines += curve(x, self._amplitude[number].place(MICRO * side[:, number]))
+                    lines += curve(x, self._amplitude[trend.column].place(
+                        MICRO * side[:, trend.column]))
             self._recording.still(f'{self.path(self._entity, trend)}/band', rr.LineStrips2D(
                 lines, colors=BAND, radii=LINE, draw_order=-5.0))
 
     def compare(self, event: Compared) -> None:
         """Add measured points."""
         for column, channel in enumerate(event.channels):
-            trail = self._trails[channel]
-            amplitude = self._amplitude[trail.number].place(
+            trail = self._trails.get(channel)
+            if trail is None:
+                continue
+            amplitude = self._amplitude[trail.trend.column].place(
                 MICRO * event.amplitude[:, column])
             turned = np.degrees(np.angle(np.exp(1j * event.phase[:, column])))
             points = np.column_stack([
@@ -112,7 +115,7 @@ class Bode:
                 self._phase.place(turned)])
             for stamp_ns, point in zip(event.stamp_ns.tolist(), points, strict=True):
                 if trail.add(stamp_ns, point):
-                    self._draw_trail(self._trends[trail.number], stamp_ns, trail.points())
+                    self._draw_trail(trail.trend, stamp_ns, trail.points())
 
     def now(self, stamp_ns: IntArray, speed: FloatArray) -> None:
         """Draw a line at the speed of the moment."""
@@ -155,8 +158,8 @@ class Bode:
 class Trail:
     """Points that were measured lately, spread over speed: at rest nothing is added."""
 
-    def __init__(self, number: int) -> None:
-        self.number = number
+    def __init__(self, trend: Trend) -> None:
+        self.trend = trend
         self._points: deque[FloatArray] = deque(maxlen=TRAIL)
         self._drawn_ns: int | None = None
 

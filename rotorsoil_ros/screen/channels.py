@@ -19,9 +19,24 @@ CHANNEL_COLOURS = ((78, 154, 230), (255, 159, 54), (80, 190, 90), (235, 90, 90),
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """One channel on the screen: its kind, its entity (split at the station), its colour."""
+    """
+    One channel on the screen.
+
+    Attributes
+    ----------
+    channel : Channel
+        Which.
+    column : int
+        Of those that are predicted.
+    kind, entity : str
+        What it is shown among, and its path, split at the station.
+    colour : tuple of three ints
+        Of its lines.
+
+    """
 
     channel: Channel
+    column: int
     kind: str
     entity: str
     colour: tuple[int, int, int]
@@ -52,7 +67,12 @@ def moving_housings(case: Case) -> list[str]:
 
 
 def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]:
-    """Return how the channels of a case are shown."""
+    """
+    Return how the channels of a case are shown.
+
+    Of a neighbour its housings are, as in every total: with all that it has ten machines would
+    show a hundred.
+    """
     _, *beside = placed(case)
     owners = {station.name: NEIGHBOURS for _, rotor, _ in beside
               for stations in (rotor.bearings, rotor.discs, rotor.probes) for station in stations}
@@ -62,12 +82,14 @@ def trends(machine: str, case: Case, channels: Sequence[Channel]) -> list[Trend]
     owners |= {probe.name: PROBES for probe in case.ground_probes}
     owners |= {foundation.name: BLOCK for foundation in case.foundations}
     shown: list[Trend] = []
-    for channel in channels:
+    for column, channel in enumerate(channels):
         # Patches and probes of a foundation that bends have names of their own.
         kind = _kind(channel, owners.get(channel.station, BLOCK))
+        if kind == NEIGHBOURS and not channel.is_housing:
+            continue
         colour = CHANNEL_COLOURS[sum(trend.kind == kind for trend in shown) % len(CHANNEL_COLOURS)]
         entity = entity_of(machine, channel.station, channel.motion)
-        shown.append(Trend(channel, kind, entity, colour))
+        shown.append(Trend(channel, column, kind, entity, colour))
     return shown
 
 

@@ -19,6 +19,8 @@ from rotorsoil_ros.screen.scene import Scene
 
 # Of message time, after which the last answer of a machine counts no more.
 _QUIET_NS = 3 * NANOSECONDS
+# Between the plant and what belongs to all: no machine is called so, their names are words.
+_ALL = 'all-machines'
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class ShownPlant:
 
     def entity(self, *parts: str) -> str:
         """Return the path of something that belongs to all of them."""
-        return rr.new_entity_path([self.plant, *parts])
+        return rr.new_entity_path([self.plant, _ALL, *parts])
 
 
 @dataclass(frozen=True, slots=True)

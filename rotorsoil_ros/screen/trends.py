@@ -57,10 +57,10 @@ class TrendLines:
         self._recording.series(
             entity_of(self._machine, 'speed'), stamps, rad_s_to_rpm(speed),
             style=rr.SeriesLines(names=self._machine, colors=(210, 210, 210)))
-        for number, trend in enumerate(self._trends):
-            found = displacement[:, number]
+        for trend in self._trends:
+            found = displacement[:, trend.column]
             self._answer(trend, 'predicted', stamps, speed, found, colour=trend.colour, width=1.5)
-            lasting = found if steady is None else steady[rows, number]
+            lasting = found if steady is None else steady[rows, trend.column]
             if np.any(np.abs(lasting - found) > OTHER * np.abs(lasting)):
                 self._answer(trend, STEADY, stamps, speed, lasting, colour=trend.pale, width=0.8)
 
@@ -86,17 +86,17 @@ class TrendLines:
             np.concatenate([getattr(event, name) for event in events])
             for name in ('stamp_ns', 'speed', 'low', 'high'))
         rows = self._recording.begins(f'{self._machine} band', stamps, BAND_NS)
-        for number, trend in enumerate(self._trends if len(rows) else ()):
+        for trend in self._trends if len(rows) else ():
             # The name of the prediction, which comes first: they share a line of the legend.
             style = rr.SeriesLines(names=trend.channel, colors=trend.faint, widths=0.8)
             for side, values in (('soil_low', low), ('soil_high', high)):
                 self._recording.series(
                     f'{trend.entity}/amplitude/{side}', stamps[rows],
-                    MICRO * values[rows, number], style=style)
+                    MICRO * values[rows, trend.column], style=style)
                 if trend.kind == HOUSINGS:
                     self._recording.series(
                         f'{trend.entity}/velocity/{side}', stamps[rows],
-                        MM_RMS * speed[rows] * values[rows, number], style=style)
+                        MM_RMS * speed[rows] * values[rows, trend.column], style=style)
 
     def compared(self, event: Compared) -> None:
         """Draw what was measured."""
@@ -104,7 +104,9 @@ class TrendLines:
             f'{self._machine} {event.channels}', event.stamp_ns, TREND_NS)
         stamps, speed = event.stamp_ns[rows], event.speed[rows]
         for number, channel in enumerate(event.channels if len(rows) else ()):
-            trend = self._by_channel[channel]
+            trend = self._by_channel.get(channel)
+            if trend is None:
+                continue
             size = event.amplitude[rows, number]
             style = rr.SeriesPoints(names=f'{channel} measured', colors=trend.colour,
                                     marker_sizes=4.0, markers='diamond')

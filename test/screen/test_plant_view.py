@@ -10,6 +10,7 @@ pytest.importorskip('rerun', reason='rerun-sdk is optional')
 from rotorsoil_ros.case import document
 from rotorsoil_ros.case.config import case_of
 from rotorsoil_ros.case.models import coupled_model
+from rotorsoil_ros.screen.blueprint import Shown
 from rotorsoil_ros.screen.channels import HOUSINGS, NEIGHBOURS, trends
 from rotorsoil_ros.screen.plant import PlantView, ShownPlant
 from rotorsoil_ros.screen.scene import Scene
@@ -18,6 +19,7 @@ from recordings import Paper, predicted, START
 
 CONFIG = Path(__file__).parents[2] / 'config'
 SECOND = 10**9
+TOGETHER = '/house/all-machines/'
 
 
 @pytest.fixture
@@ -72,9 +74,27 @@ def test_a_disc_of_a_standing_machine_lies_flat(house):
 
 def test_what_neighbours_do_has_a_tab_of_its_own(house):
     case, channels = house
-    kinds = {trend.channel: trend.kind for trend in trends('fan_1', case, channels)}
+    shown = trends('fan_1', case, channels)
+    kinds = {trend.channel: trend.kind for trend in shown}
     assert kinds['fan_1_fan_end_housing_x'] == HOUSINGS
-    assert kinds['fan_2_fan_end_housing_x'] == kinds['pump_wheel_z'] == NEIGHBOURS
+    beside = [channel for channel, kind in kinds.items() if kind == NEIGHBOURS]
+    assert beside == [channel for channel in channels
+                      if channel.is_housing and not channel.startswith('fan_1')]
+    assert all(channels[trend.column] == trend.channel for trend in shown)
+
+
+@pytest.mark.parametrize('name', ['house/total', 'house/picture', 'house/caption', 'house'])
+def test_a_machine_of_any_name_is_drawn_apart_from_its_plant(house, name):
+    case, channels = house
+    plant = ShownPlant('house', (name,), Scene(case, channels))
+    machine = Shown(name, case, trends(name, case, channels), Scene(case, channels))
+    own = [trend.entity for trend in machine.trends] + [
+        machine.entity(part) for part in ('speed', 'picture', 'caption')]
+    for together in (plant.entity('total', channels[0]), *(
+            plant.entity(part) for part in ('picture', 'caption'))):
+        assert not [path for path in own if path == together
+                    or path.startswith(f'{together}/') or together.startswith(f'{path}/')]
+    assert not [path for path in own if path.startswith(plant.entity('total') + '/')]
 
 
 @pytest.fixture
@@ -99,7 +119,7 @@ def test_each_source_moves_the_block_at_its_own_frequency(paper, machine, plant)
     for name, speed in (('fan', 300.0), ('other', 150.0)):
         plant.take(answers(machine, name, speed))
     plant.flush()
-    [words] = paper.drawn['/house/caption', 'TextDocument:text'][-1]
+    [words] = paper.drawn[TOGETHER + 'caption', 'TextDocument:text'][-1]
     scale = float(words.split(' x ')[1].split('*')[0])
     assert 'fan 2865 rpm, other 1432 rpm' in words
     first = machine.table.channels.index('block_x')
@@ -108,7 +128,7 @@ def test_each_source_moves_the_block_at_its_own_frequency(paper, machine, plant)
     expected = sum(np.real(answers(machine, 'it', speed).prediction.displacement[
         0, first:first + 3] * np.exp(1j * turn))
         for speed, turn in ((300.0, 0.5 * np.pi), (150.0, 0.25 * np.pi)))
-    moved = paper.drawn['/house/picture/block/moving', 'Transform3D:translation'][-1][0]
+    moved = paper.drawn[TOGETHER + 'picture/block/moving', 'Transform3D:translation'][-1][0]
     np.testing.assert_allclose(moved, scale * expected, rtol=1e-6)  # single precision
 
 
@@ -120,7 +140,7 @@ def test_housings_feel_the_root_of_the_sum_of_squares(paper, machine, plant):
     at = machine.table.channels.index('bearing_1_housing_z')
     parts = [event.prediction.speed[0] * abs(event.prediction.displacement[0, at])
              for event in events]
-    assert paper.drawn['/house/total/bearing_1_housing_z', 'values'] == pytest.approx(
+    assert paper.drawn[TOGETHER + 'total/bearing_1_housing_z', 'values'] == pytest.approx(
         [1e3 * np.hypot(*parts) / np.sqrt(2.0)] * 11)
 
 
@@ -128,9 +148,9 @@ def test_a_silent_machine_adds_nothing_and_is_named(paper, machine, plant):
     plant.take(answers(machine, 'other', 150.0))
     plant.take(answers(machine, 'fan', 300.0, start=START + 5 * SECOND))
     plant.flush()
-    [words] = paper.drawn['/house/caption', 'TextDocument:text'][-1]
+    [words] = paper.drawn[TOGETHER + 'caption', 'TextDocument:text'][-1]
     assert 'at fan 2865 rpm, nothing of other;' in words
     alone = answers(machine, 'fan', 300.0).prediction
     at = machine.table.channels.index('bearing_1_housing_z')
-    assert paper.drawn['/house/total/bearing_1_housing_z', 'values'][-1] == pytest.approx(
+    assert paper.drawn[TOGETHER + 'total/bearing_1_housing_z', 'values'][-1] == pytest.approx(
         1e3 * 300.0 * abs(alone.displacement[0, at]) / np.sqrt(2.0))
