@@ -12,8 +12,6 @@ from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.boundary.table import BoundaryTable
 from rotorsoil_ros.ground.soil import Contact, Soil, static_scale
 
-# A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-
 
 class SiteGround(ABC):
     """Ground below rigid massless contacts that are coupled through it."""

@@ -191,12 +191,11 @@ class RayElements:
         inner = 1.0 / np.abs(s) ** 2 + np.abs(phase[:, 1:2]) ** 2
         samples = np.concatenate(
             [slope[:, 1:] * np.sqrt(measure), value[:, 1:] * np.sqrt(measure * inner)], axis=2)
-        triangle = np.linalg.qr(samples.swapaxes(1, 2), mode='r')
+        triangle = np.swapaxes(np.linalg.qr(samples.swapaxes(1, 2), mode='r'), 1, 2)
         size = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
         if not size.min() > DEPENDENT * size.max():
             raise NotSolvedError(
                 f'the waves cannot be told apart at |k| = {np.abs(waves[1]):g} per contact length')
-        combine = np.linalg.inv(triangle).swapaxes(1, 2)
-        value[:, 1:] = combine @ value[:, 1:]
-        slope[:, 1:] = combine @ slope[:, 1:]
+        value[:, 1:], slope[:, 1:] = (
+            np.linalg.solve(triangle, part[:, 1:]) for part in (value, slope))
         return value, slope

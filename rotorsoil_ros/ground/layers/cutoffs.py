@@ -94,17 +94,15 @@ def _of_turning_waves(line: LineMatrices, depth: float) -> Iterator[float]:
     """Yield minima of the branches omega(k) of waves in the plane of motion, at k > 0."""
     k = _WAVENUMBERS / depth
     size = len(line.v_mu)
-    root = np.linalg.inv(np.linalg.cholesky(line.v_rho))
     square = (k**2)[:, None, None]
     matrix = np.zeros((len(k), 2 * size, 2 * size))
-    matrix[:, :size, :size] = root @ (
-        square * (line.v_lambda + 2.0 * line.v_mu) + line.d_mu) @ root.T
-    matrix[:, size:, size:] = root @ (
-        square * line.v_mu + line.d_lambda + 2.0 * line.d_mu) @ root.T
-    matrix[:, :size, size:] = k[:, None, None] * (
-        root @ (line.e_mu.T - line.e_lambda) @ root.T)
+    matrix[:, :size, :size] = square * (line.v_lambda + 2.0 * line.v_mu) + line.d_mu
+    matrix[:, size:, size:] = square * line.v_mu + line.d_lambda + 2.0 * line.d_mu
+    matrix[:, :size, size:] = k[:, None, None] * (line.e_mu.T - line.e_lambda)
     matrix[:, size:, :size] = matrix[:, :size, size:].swapaxes(1, 2)
-    branch = np.sqrt(np.maximum(np.linalg.eigvalsh(matrix), 0.0))
+    root = np.kron(np.eye(2), np.linalg.cholesky(line.v_rho))
+    of_unit_mass = np.linalg.solve(root, np.linalg.solve(root, matrix).swapaxes(1, 2))
+    branch = np.sqrt(np.maximum(np.linalg.eigvalsh(of_unit_mass), 0.0))
     left, middle, right = branch[:-2], branch[1:-1], branch[2:]
     for at, number in zip(*np.nonzero((middle < left) & (middle < right)), strict=True):
         before, here, after = (part[at, number] for part in (left, middle, right))

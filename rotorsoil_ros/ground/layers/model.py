@@ -29,8 +29,6 @@ _ENDS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)
 # Ratios are kept to so many digits: what differs by round-off is one ground.
 _DIGITS = 11
 
-# A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-
 
 @dataclass(frozen=True, slots=True)
 class Proportions:

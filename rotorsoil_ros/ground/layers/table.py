@@ -12,8 +12,6 @@ from rotorsoil_ros.ground.rational import RationalMatrix
 
 ENTRIES = ('xx', 'zz', 'rxrx', 'ryry', 'rzrz', 'x_ry', 'y_rx')
 
-# A few units in the last place lost on the way from rad/s to a0 are not another frequency.
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayeredTable:

@@ -260,8 +260,9 @@ class ContactForm:
 
 def _free_on_one(rows: FloatArray, elastic: FloatArray) -> FloatArray:
     """Return rigid and elastic motion per motion of one contact and elastic motion."""
-    inverse, count = np.linalg.inv(rows), elastic.shape[1]
-    return np.block([[inverse, -inverse @ elastic], [np.zeros((count, len(rows))), np.eye(count)]])
+    own, count = rows.shape[1], elastic.shape[1]
+    rigid = np.linalg.solve(rows, np.concatenate([np.eye(own), -elastic], axis=1))
+    return np.concatenate([rigid, np.eye(count, own + count, own)])
 
 
 def _free_on_patches(
@@ -282,7 +283,7 @@ def _free_on_patches(
             f'modes, got a rank of {np.linalg.matrix_rank(flexibility, hermitian=True)}')
     per_force = np.linalg.solve(flexibility, rows)
     rigid = np.linalg.solve(rows.T @ per_force, per_force.T)
-    force = np.linalg.inv(flexibility) - per_force @ rigid
+    force = np.linalg.solve(flexibility, np.eye(len(rows)) - rows @ rigid)
     imposed = np.concatenate([rigid, elastic.T @ force])
     # Rigid motion in units in which it counts as much as the elastic one.
     unit = np.linalg.norm(elastic) / np.linalg.norm(rows)

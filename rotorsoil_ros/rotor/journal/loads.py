@@ -66,7 +66,7 @@ def sinking(bearing: Bearing, *, on_film: bool) -> float:
     A film is as good as rigid. Dampers, and seals that only push across, carry nothing.
     """
     below = 0.0 if bearing.pedestal is None else float(
-        np.linalg.inv(bearing.pedestal.stiffness)[1, 1])
+        np.linalg.solve(bearing.pedestal.stiffness, np.array([0.0, 1.0]))[1])
     if on_film:
         return below
     upright = float(values(bearing.stiffness).reshape(-1, 2, 2)[0, 1, 1])
