@@ -10,7 +10,7 @@ from rotorsoil_ros.ground.boundary.model import BoundaryElementModel
 from rotorsoil_ros.ground.boundary.site import Site
 from rotorsoil_ros.ground.cone import ConeModel
 from rotorsoil_ros.ground.soil import Rectangle, Soil
-from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.coupled import CoupledModel, UNBALANCE_FORCE
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.bearing import Bearing, Pedestal
@@ -160,3 +160,13 @@ def shared(points=PLACES, highest=320.0):
     ground = BoundaryElementModel.solved_together(SOIL, site, omega_max=highest)
     names = ('yard', 'wall')[:len(points)]
     return replace(model, soil_models=(ground,), points=names)
+
+
+def work_put_in(model, speed, unbalance):
+    """Return pi Im(x^H F) over the discs of the machine, F = m Omega^2 exp(i phase) (-i, 1)."""
+    discs = [model.channels.index(f'{disc.name}_{axis}')
+             for disc in model.rotor.discs for axis in 'xz']
+    motion = model.unbalance_response(speed, unbalance).displacement[:, discs]
+    force = speed[:, None]**2 * np.outer(
+        unbalance[:len(model.rotor.discs)], UNBALANCE_FORCE).ravel()
+    return math.pi * (motion.conj() * force).imag.sum(axis=1)

@@ -109,8 +109,8 @@ def test_published_unbalance_response_of_the_three_disc_rotor():
     prediction = model.unbalance_response(
         np.array([given['speed_rpm'] * 2.0 * math.pi / 60.0]), np.array([0.0, given['me'], 0.0]))
     y, z = (channel(model, prediction, f'disc_2_{axis}')[0] for axis in 'zx')
-    # code_aster's own figures lie 1.0e-3 and 0.8e-3 below those of the book.
-    np.testing.assert_allclose([abs(y), abs(z)], expected[:2], rtol=1.2 * rtol)
+    # The figures of code_aster itself lie as far below those of the book.
+    np.testing.assert_allclose([abs(y), abs(z)], expected[:2], rtol=rtol)
     np.testing.assert_allclose(np.degrees(np.angle([y, z])), expected[2:], atol=0.02)
 
 

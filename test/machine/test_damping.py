@@ -10,7 +10,6 @@ import pytest
 
 import rotorsoil_ros as rs
 from rotorsoil_ros.ground.cone import ConeModel
-from rotorsoil_ros.machine.coupled import UNBALANCE_FORCE
 from rotorsoil_ros.machine.damping import (
     BEARINGS,
     DampingSplitter,
@@ -21,7 +20,7 @@ from rotorsoil_ros.machine.damping import (
 )
 from rotorsoil_ros.units import rpm_to_rad_s
 
-from machines import elastic_machine
+from machines import elastic_machine, work_put_in
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT.parent / 'config'
@@ -34,15 +33,6 @@ def rows_of(name):
 
 def machine_of(case):
     return rs.load(CONFIG / f'{case}.yaml')
-
-
-def work_put_in(model, speed, unbalance):
-    """Return pi Im(x^H F) over the discs, F = m Omega^2 exp(i phase) (-i, 1)."""
-    found = model.unbalance_response(speed, unbalance)
-    first, count = 4 * len(model.rotor.bearings), len(model.rotor.discs)
-    motion = found.displacement[:, first:first + 2 * count].reshape(len(speed), count, 2)
-    force = speed[:, None, None]**2 * (unbalance[:count, None] * UNBALANCE_FORCE)
-    return math.pi * (motion.conj() * force).imag.sum(axis=(1, 2))
 
 
 @pytest.mark.parametrize('row', rows_of('damping_split_forced'),

@@ -465,8 +465,10 @@ def test_coarse_and_noisy_tables_keep_the_light_criticals_of_the_cones(count, no
     assert [one.whirl for one in found] == [one.whirl for one in expected] == [-1, 1, -1, 1]
     np.testing.assert_allclose([one.speed for one in found], [one.speed for one in expected],
                                rtol=1e-3)
+    # All of the soil: splines through 4 points miss 12 % of it, those through 60 with 5 % of
+    # noise 7 %.
     np.testing.assert_allclose([one.damping_ratio for one in found],
-                               [one.damping_ratio for one in expected], rtol=0.2)
+                               [one.damping_ratio for one in expected], rtol=0.13)
 
 
 def test_mode_that_a_jumping_table_does_not_determine_is_an_error_and_not_left_out():

@@ -1,7 +1,6 @@
 """Two machines on a raft that bends: modes, damping and films, against all motions together."""
 
 from dataclasses import replace
-import math
 from pathlib import Path
 
 from foundations import apart, PATCH, raft_body
@@ -11,7 +10,6 @@ import scipy.linalg
 
 from rotorsoil_ros.case import config
 from rotorsoil_ros.ground.soil import Rectangle
-from rotorsoil_ros.machine.coupled import UNBALANCE_FORCE
 from rotorsoil_ros.machine.damping import DampingSplitter, STRUCTURE
 from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes.campbell import campbell
@@ -20,7 +18,7 @@ from rotorsoil_ros.machine.placement import Placement
 from rotorsoil_ros.machine.plant.neighbour import Neighbour
 from rotorsoil_ros.machine.plant.source import SourceModel
 
-from machines import renamed
+from machines import renamed, work_put_in
 from oracles.dense import eigenvalues_of, rotor_matrices
 
 FAN = Path(__file__).parents[3] / 'config' / 'plant_fan.yaml'
@@ -81,12 +79,7 @@ def test_all_that_is_put_in_is_taken_by_raft_and_machines():
     model = raft()
     speed, unbalance = np.array([60.0, 155.0]), np.array([1e-3, 5e-4j])
     found = DampingSplitter(model).forced(speed, unbalance)
-    response = model.unbalance_response(speed, unbalance)
-    discs = [model.channels.index(f'{disc.name}_{axis}')
-             for disc in model.rotor.discs for axis in 'xz']
-    force = speed[:, None] ** 2 * np.outer(unbalance, UNBALANCE_FORCE).ravel()
-    put_in = math.pi * (response.displacement[:, discs].conj() * force).imag.sum(axis=1)
-    np.testing.assert_allclose(found.total, put_in, rtol=1e-10)
+    np.testing.assert_allclose(found.total, work_put_in(model, speed, unbalance), rtol=1e-10)
     assert np.all(found.share(STRUCTURE) > 0.0)
     assert np.all(found.share('bearings', 'fan_2_fan_end') > 1e-7)
 
