@@ -46,6 +46,8 @@ class SupportModes:
         How much forces at the housings drive each.
     static, rate : (s, 2 b) complex arrays
         What all others move per force at the frequency zero, and that per frequency.
+    rows : (2 b, s) float array
+        Motion of the housings per motion of the support.
 
     Notes
     -----
@@ -63,6 +65,7 @@ class SupportModes:
     driven: ComplexArray
     static: ComplexArray
     rate: ComplexArray
+    rows: FloatArray
 
     @classmethod
     def of(
@@ -108,7 +111,12 @@ class SupportModes:
         gains = ends / (1.0 - ends * values[~kept])
         low, high = (shape[:, ~kept] * gain @ driven[~kept] for gain in gains)
         return cls(w[kept], values[kept], centre, slow, driven[kept],
-                   pushed[:own] - slow @ driven[kept] + low, (high - low) / highest)
+                   pushed[:own] - slow @ driven[kept] + low, (high - low) / highest, rows)
+
+
+def sizes(support: Support, compliance: Continuation) -> FloatArray:
+    """Return the typical size of every motion of a support, (s,)."""
+    return np.append(compliance.size, np.ones(support.elastic))
 
 
 def _states(
@@ -122,7 +130,7 @@ def _states(
     rate u of what has mass alone.
     """
     soil = compliance.states(_NOISE).beside(np.ones(support.elastic) + 0j)
-    size = np.append(compliance.size, np.ones(support.elastic))
+    size = sizes(support, compliance)
     mass = size[:, None] * support.motion_mass * size
     if carried is not None:
         mass = mass + rows.T @ carried @ rows

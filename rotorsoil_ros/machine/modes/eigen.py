@@ -7,9 +7,12 @@ import numpy as np
 
 from rotorsoil_ros.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.ground.continuation import Continuation
-from rotorsoil_ros.machine.modes.below import Elastic, SupportModes
-from rotorsoil_ros.machine.modes.guesses import CREEPING, Guesses, vibrates
+from rotorsoil_ros.machine.modes.below import Elastic
 from rotorsoil_ros.rotor.whirl import ORBITS
+
+# Frequencies w = lambda / i with less real part than this share of |w| do not vibrate: they
+# creep back, and a hysteretic soil alone gives such ones a little of it.
+CREEPING = 0.2
 
 # A vibration with less damping than this is felt: its amplification factor is above 2.5.
 FELT_BELOW = 0.2
@@ -59,10 +62,6 @@ class FreeVibration:
         Frequencies between which all this holds [rad/s].
     shafts : tuple of (slice, int array)
         Which of the bearings, and of the modes forward then backward, are those of each shaft.
-    below : SupportModes
-        What the support adds to guesses.
-    moves : (2 b, s) float array
-        Housing motion per all of its motions.
     slow : int
         So many motions of the rotors on their real bearings are within `reach`.
 
@@ -81,8 +80,6 @@ class FreeVibration:
     reach: float
     within: tuple[FloatArray, FloatArray]
     shafts: tuple[tuple[slice, IntArray], ...]
-    below: SupportModes
-    moves: FloatArray
     slow: int
 
     @cached_property
@@ -119,6 +116,7 @@ class FreeVibration:
     def pick(
         self, modes: IntArray,
     ) -> tuple[AnyArray, ComplexArray, ComplexArray]:
+        """Return some of these, (n, k) of each speed."""
         inverse, orbits, driven = self.modes
         return (np.take_along_axis(inverse, modes, axis=1),
                 np.take_along_axis(orbits, modes[:, None], axis=2),
@@ -212,18 +210,21 @@ class FreeVibration:
         total[..., motion, motion] += np.eye(own) + compliance @ (self.spring - w**2 * mass)
         return total
 
-    def guesses(self, count: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return frequencies (n, p) and vectors (n, p, d) that are nearly right."""
-        return Guesses(self).lowest(count)
-
-    def solve(self, count: int) -> tuple[ComplexArray, ComplexArray, BoolArray, FloatArray]:
+    def solve(
+        self, guess: ComplexArray, vector: ComplexArray,
+    ) -> tuple[ComplexArray, ComplexArray, BoolArray, FloatArray]:
         """
-        Solve for the lowest frequencies.
+        Solve for the frequencies next to guesses (n, p), NaN where there is none [rad/s].
+
+        Parameters
+        ----------
+        guess, vector : (n, p), (n, p, d) complex arrays
+            As `Guesses.lowest`.
 
         Returns
         -------
         frequency : (n, p) complex array
-            w [rad/s] of at most `count`, NaN where there are fewer.
+            w [rad/s], NaN where there are fewer.
         vector : (n, p, d) complex array
             What `matrix` sends to zero.
         sound : (n,) bool array
@@ -233,7 +234,6 @@ class FreeVibration:
             determined [rad/s]; infinite where there is none.
 
         """
-        guess, vector = self.guesses(count)
         exists = np.isfinite(guess)
         frequency = np.where(exists, guess, self.highest)
         wanted: BoolArray = exists & self.compliance.agrees(frequency)
@@ -332,3 +332,8 @@ def _repeats(frequency: ComplexArray, vector: ComplexArray) -> BoolArray:
     gap = np.abs(frequency[:, :, None] - frequency[:, None])
     same = gap <= 2.0 * _CONVERGED * np.abs(frequency)[:, None]
     return np.asarray(np.tril(parallel & same, -1).any(axis=2))
+
+
+def vibrates(frequency: ComplexArray) -> BoolArray:
+    """Return which eigenvalues vibrate at all; overdamped ones have no frequency."""
+    return np.asarray(frequency.real > CREEPING * np.abs(frequency))

@@ -7,8 +7,8 @@ import numpy as np
 from rotorsoil_ros.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorsoil_ros.errors import NotSolvedError
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.eigen import CREEPING
 from rotorsoil_ros.machine.modes.feeding import knots
-from rotorsoil_ros.machine.modes.guesses import CREEPING
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 from rotorsoil_ros.units import rad_s_to_rpm
 

@@ -2,18 +2,12 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorsoil_ros.arrays import BoolArray, ComplexArray, IntArray
-
-if TYPE_CHECKING:
-    from rotorsoil_ros.machine.modes.eigen import FreeVibration
-
-# Frequencies w = lambda / i with less real part than this share of |w| do not vibrate: they
-# creep back, and a hysteretic soil alone gives such ones a little of it.
-CREEPING = 0.2
+from rotorsoil_ros.arrays import ComplexArray, IntArray
+from rotorsoil_ros.machine.modes.below import SupportModes
+from rotorsoil_ros.machine.modes.eigen import FreeVibration, vibrates
 
 # Guesses this far outside the piece of their compliance may still lead into it.
 _ASIDE = 0.05
@@ -28,10 +22,13 @@ class Guesses:
     ----------
     of : FreeVibration
         The equations.
+    below : SupportModes
+        Modes of its support.
 
     """
 
-    of: 'FreeVibration'
+    of: FreeVibration
+    below: SupportModes
 
     def pencil(self) -> tuple[ComplexArray, ComplexArray]:
         """
@@ -43,7 +40,7 @@ class Guesses:
         slow, static, first, second = self._slow
         inverse, orbits, driven = self.of.pick(slow)
         constant, linear, inertia = self.of.bearings
-        below, (length, ports, modes) = self.of.below, orbits.shape
+        below, (length, ports, modes) = self.below, orbits.shape
         heavy = ports if inertia.any() else 0
         sizes = (ports, modes, len(below.frequency), ports, ports, ports, heavy)
         ends = np.cumsum(sizes)
@@ -64,9 +61,9 @@ class Guesses:
         # the support's by forces g + gap, and the housings h that it moves, with v their rate,
         a[:, own, own], b[:, own, own] = 1.0 + below.centre * below.weight, below.weight
         a[:, support, force] = a[:, support, gap] = -below.driven
-        a[:, housing, housing], a[:, housing, support] = one, -self.of.moves @ below.shape
-        a[:, housing, force] = a[:, housing, gap] = -self.of.moves @ below.static
-        b[:, housing, force] = b[:, housing, gap] = self.of.moves @ below.rate
+        a[:, housing, housing], a[:, housing, support] = one, -self.below.rows @ below.shape
+        a[:, housing, force] = a[:, housing, gap] = -self.below.rows @ below.static
+        b[:, housing, force] = b[:, housing, gap] = self.below.rows @ below.rate
         a[:, rate, rate], b[:, rate, housing] = one, one / middle
         # and what is between journals and housings.
         a[:, gap, gap], a[:, gap, mode] = one, -orbits
@@ -103,7 +100,7 @@ class Guesses:
         a, b = self.pencil()
         memory = np.flatnonzero(b.any(axis=(0, 1)))
         # No passive machine grows so: the inverse exists even without mass or static stiffness.
-        centre = self.of.below.centre
+        centre = self.below.centre
         spread = np.linalg.solve(a - centre * b, b[..., memory])
         values, vectors = np.linalg.eig(spread[:, memory])
         values = np.where(np.abs(values) * self.of.highest < 1e-6, 1e-6 / self.of.highest, values)
@@ -120,15 +117,10 @@ class Guesses:
 
     def _unknowns(self, frequency: ComplexArray, full: ComplexArray) -> ComplexArray:
         """Return the unknowns of `matrix` out of those of the pencil, (n, p, d)."""
-        ports, modes, below = len(self.of.rows), self.of.resonant.shape[1], self.of.below
+        ports, modes, below = len(self.of.rows), self.of.resonant.shape[1], self.below
         first, own = ports + 2 * modes, slice(len(self.of.mass))
         last = first + len(below.frequency)
         through = full[..., :ports] + full[..., last:last + ports]
         motion = full[..., first:last] @ below.shape[own].T + through @ below.static[own].T
         motion += frequency[..., None] * (through @ below.rate[own].T)
         return np.concatenate([full[..., :ports + modes], motion], axis=-1)
-
-
-def vibrates(frequency: ComplexArray) -> BoolArray:
-    """Return which eigenvalues vibrate at all; overdamped ones have no frequency."""
-    return np.asarray(frequency.real > CREEPING * np.abs(frequency))

@@ -10,8 +10,8 @@ from rotorsoil_ros.channel import ACROSS
 from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes.below import SupportModes
-from rotorsoil_ros.machine.modes.guesses import vibrates
+from rotorsoil_ros.machine.modes.below import sizes, SupportModes
+from rotorsoil_ros.machine.modes.eigen import vibrates
 from rotorsoil_ros.machine.support import Support
 from rotorsoil_ros.rotor.assembly import Rotor
 
@@ -107,7 +107,7 @@ def _vibrations(
     within: tuple[float, float],
 ) -> tuple[FloatArray, ComplexArray]:
     """Return what vibrates between two frequencies, as `natural_frequencies`."""
-    rows = support.motion_rows * np.append(compliance.size, np.ones(support.elastic))
+    rows = support.motion_rows * sizes(support, compliance)
     modes = SupportModes.of(support, compliance, span[1], rows=rows, carried=carried)
     frequency = modes.frequency
     chosen = np.flatnonzero(vibrates(frequency) & (np.abs(frequency) <= span[1])

@@ -9,6 +9,7 @@ from rotorsoil_ros.arrays import ComplexArray, FloatArray
 from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.ground.rational import States
 from rotorsoil_ros.machine.coupled import CoupledModel
+from rotorsoil_ros.machine.modes.below import sizes
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.machine.modes.zones import Zone
 from rotorsoil_ros.rotor.whirl import ORBITS
@@ -110,7 +111,7 @@ class Pencil:
     @cached_property
     def size(self) -> FloatArray:
         """Typical size of the motions of the support, (s,)."""
-        return np.append(self.compliance.size, np.ones(self.model.support.elastic))
+        return sizes(self.model.support, self.compliance)
 
     @cached_property
     def unit(self) -> float:

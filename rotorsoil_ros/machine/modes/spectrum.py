@@ -11,8 +11,9 @@ from rotorsoil_ros.errors import NotSolvedError, OutOfTableError
 from rotorsoil_ros.ground.continuation import Continuation
 from rotorsoil_ros.machine.continued import continued_by_pieces
 from rotorsoil_ros.machine.coupled import CoupledModel
-from rotorsoil_ros.machine.modes.below import Elastic, parted, SupportModes
+from rotorsoil_ros.machine.modes.below import Elastic, parted, sizes, SupportModes
 from rotorsoil_ros.machine.modes.eigen import FreeVibration
+from rotorsoil_ros.machine.modes.guesses import Guesses
 from rotorsoil_ros.machine.modes.shafts import MORE_SHAPES, ShaftLine, Shafts
 from rotorsoil_ros.machine.modes.zones import Zone, zones_of
 from rotorsoil_ros.rotor.reduced import Whirls
@@ -257,7 +258,8 @@ class SpectrumSolver:
         """Return the vibrations whose frequency lies in a zone, and those just beyond it."""
         for reach in _REACHES:
             vibration = self._at(speed, whirls, zone, reach)
-            frequency, vector, sound, untold = vibration.solve(count)
+            frequency, vector, sound, untold = vibration.solve(
+                *Guesses(vibration, self._below[id(zone.compliance)]).lowest(count))
             if sound.all():
                 break
         else:
@@ -319,22 +321,15 @@ class SpectrumSolver:
             size[:, None] * spring[held, held] * size, elastic, zone.compliance,
             self.span[1], reach, zone.ends(zone.told, speed),
             tuple(zip(self.shafts.seats, self.shafts.modes, strict=True)),
-            self._below[id(zone.compliance)], unit[:, None] * self._moves(zone.compliance),
             self.shafts.slow(constant, reach * self.span[1]))
-
-    def _moves(self, compliance: Continuation) -> FloatArray:
-        """Return housing motion per motion of the support in units of its size, (2 b, s)."""
-        support = self.model.support
-        return np.asarray(support.motion_rows * np.append(
-            compliance.size, np.ones(support.elastic)))
 
     @cached_property
     def _below(self) -> dict[int, SupportModes]:
         """Modes of the support in each piece, which no speed changes."""
-        unit = np.repeat(np.sqrt(self.shafts.springs), 2)[:, None]
+        support, unit = self.model.support, np.repeat(np.sqrt(self.shafts.springs), 2)[:, None]
         return {id(piece): SupportModes.of(
-            self.model.support, piece, self.span[1], rows=unit * self._moves(piece), rough=True)
-            for piece in self.pieces}
+            support, piece, self.span[1], rough=True,
+            rows=unit * support.motion_rows * sizes(support, piece)) for piece in self.pieces}
 
     @cached_property
     def _parted(self) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:

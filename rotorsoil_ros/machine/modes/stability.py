@@ -12,6 +12,7 @@ from rotorsoil_ros.arrays import BoolArray, FloatArray
 from rotorsoil_ros.errors import solved
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.machine.modes import feeding
+from rotorsoil_ros.machine.modes.eigen import CREEPING
 from rotorsoil_ros.machine.modes.feeding import CROSS, Feed, feeds
 from rotorsoil_ros.machine.modes.following import (
     ALONG_CURVE,
@@ -22,7 +23,6 @@ from rotorsoil_ros.machine.modes.following import (
     grows,
     vibrations_at,
 )
-from rotorsoil_ros.machine.modes.guesses import CREEPING
 from rotorsoil_ros.machine.modes.names import ModeNames
 from rotorsoil_ros.machine.modes.pencil import Pencil, Vibrations
 

@@ -49,7 +49,6 @@ class Zone:
         return (np.maximum(low, speed) if self.lag > 0.0 else low,
                 np.minimum(high, speed) if self.lag < 0.0 else high)
 
-
     def astray(
         self, frequency: ComplexArray, low: FloatArray, high: FloatArray,
     ) -> FloatArray:

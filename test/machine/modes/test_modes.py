@@ -17,6 +17,7 @@ from rotorsoil_ros.machine.foundation import Foundation
 from rotorsoil_ros.machine.modes import eigen, shafts, spectrum
 from rotorsoil_ros.machine.modes.campbell import campbell
 from rotorsoil_ros.machine.modes.critical import critical_speeds
+from rotorsoil_ros.machine.modes.guesses import Guesses
 from rotorsoil_ros.machine.modes.natural import lowest_natural_frequency
 from rotorsoil_ros.machine.modes.spectrum import SpectrumSolver
 from rotorsoil_ros.machine.peaks import half_power_factors
@@ -171,17 +172,19 @@ def test_one_mode_twice_is_a_repetition_but_two_of_one_frequency_are_not():
 
 
 def vibration_of(model, highest):
-    """Return the equations of free vibration at one speed, at the first reach."""
+    """Return the equations of free vibration at one speed, and guesses, at the first reach."""
     solver = SpectrumSolver.up_to(model, highest)
     speed = np.array([400.0])
-    return solver._at(speed, solver.shafts.whirls(speed, 0.0, 0.0), solver.zones[0], 1.5)
+    [zone] = solver.zones
+    vibration = solver._at(speed, solver.shafts.whirls(speed, 0.0, 0.0), zone, 1.5)
+    return vibration, Guesses(vibration, solver._below[id(zone.compliance)])
 
 
 @pytest.mark.parametrize('stiffness', [1e6, 1e9])
 def test_guesses_are_close_at_any_stiffness_of_the_bearings(stiffness):
-    vibration = vibration_of(paper_machine(mass=20.0, stiffness=stiffness), 1500.0)
-    guess, _ = vibration.guesses(8)
-    found, _, sound, _ = vibration.solve(8)
+    vibration, guesses = vibration_of(paper_machine(mass=20.0, stiffness=stiffness), 1500.0)
+    guess, vector = guesses.lowest(8)
+    found, _, sound, _ = vibration.solve(guess, vector)
     assert sound.all()
     np.testing.assert_allclose(guess, found, rtol=2e-3)  # at the upper end
 
@@ -193,27 +196,27 @@ def test_guesses_know_the_mass_of_rotor_modes_that_are_not_solved_for():
         discs=[Disc('a', 0.0, 200.0, 2.0, 4.0), Disc('b', 0.5, 300.0, 3.0, 6.0)],
         bearings=[bearing('left', 0.0, stiffness=1e11), bearing('right', 0.5, stiffness=1e11)])
     block = Foundation('block', CONTACT, 0.25, 400.0, 0.0, (30.0, 30.0, 60.0))
-    vibration = vibration_of(CoupledModel(rotor, (block,), (CONE,)), 900.0)
+    vibration, guesses = vibration_of(CoupledModel(rotor, (block,), (CONE,)), 900.0)
     assert vibration.resonant.shape[1] == 0
-    guess, _ = vibration.guesses(6)
-    found, _, _, _ = vibration.solve(6)
+    guess, vector = guesses.lowest(6)
+    found, _, _, _ = vibration.solve(guess, vector)
     np.testing.assert_allclose(guess, found, rtol=1e-3)
 
 
 def test_guess_that_runs_to_a_far_mode_is_not_trusted(monkeypatch):
     # At first the guess of the lowest mode is missing, and that of the second is 8 % off.
-    guesses = eigen.FreeVibration.guesses
+    lowest = Guesses.lowest
 
     def spoilt(self, count):
-        frequency, vector = guesses(self, count)
-        if self.reach > 2.0:
+        frequency, vector = lowest(self, count)
+        if self.of.reach > 2.0:
             return frequency, vector
         frequency, vector = frequency[:, 1:].copy(), vector[:, 1:]
         frequency[:, 0] *= 1.08
         return frequency, vector
 
     expected = campbell(paper_machine(), SPEEDS, 6).eigenvalue
-    monkeypatch.setattr(eigen.FreeVibration, 'guesses', spoilt)
+    monkeypatch.setattr(Guesses, 'lowest', spoilt)
     np.testing.assert_allclose(campbell(paper_machine(), SPEEDS, 6).eigenvalue, expected,
                                rtol=1e-8)
 
