@@ -1,5 +1,5 @@
 """
-Measure what several machines on one block cost: tables of every source, and their size.
+Measure what several machines on one block cost: tables of every source, and criticals of one.
 
     python -m benchmarks.plant
 """
@@ -50,10 +50,13 @@ def main() -> None:
             for index in range(LOOKED_UP):
                 predictor.predict(speed[index:index + 1])
             each = (time.process_time() - start) / LOOKED_UP
+            start = time.process_time()
+            machine.critical_speeds()
+            criticals = time.process_time() - start
             size = sum(table.pieces.coefficients.nbytes for table in tables)
             print(f'{count:2d} machines, {len(machine.table.channels)} channels: {built:.3g} s of '
                   f'processor for the table of each, {size / 2**20:.3g} MiB for all, look-up '
-                  f'{1e6 * each:.3g} us')
+                  f'{1e6 * each:.3g} us, critical speeds {criticals:.2g} s')
 
 
 if __name__ == '__main__':

@@ -1,8 +1,9 @@
 """The array types of the floor, and what is taken for one."""
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 import math
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ ComplexArray: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
 AnyArray: TypeAlias = npt.NDArray[np.inexact[Any]]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 IntArray: TypeAlias = npt.NDArray[np.int64]
+_Number = TypeVar('_Number', bound=np.inexact[Any])
 Numbers: TypeAlias = float | Sequence[float] | FloatArray
 
 # By which an end of a table may be passed, of itself: units go to and fro.
@@ -87,12 +89,12 @@ def inside(
     return held
 
 
-def side_by_side(found: Sequence[ComplexArray], count: int) -> ComplexArray:
-    """Return matrices (n, d, d) as the blocks of larger ones that nothing couples."""
-    sizes = [one.shape[-1] for one in found]
-    total = np.zeros((count, sum(sizes), sum(sizes)), dtype=complex)
-    place = 0
-    for one, size in zip(found, sizes, strict=True):
-        total[:, place:place + size, place:place + size] = one
-        place += size
+def side_by_side(found: Sequence[npt.NDArray[_Number]], *count: int) -> npt.NDArray[_Number]:
+    """Return matrices (*count, d, e) as the blocks of larger ones that nothing couples."""
+    rows, columns = (np.cumsum([0, *(one.shape[axis] for one in found)]).tolist()
+                     for axis in (-2, -1))
+    total = np.zeros((*count, rows[-1], columns[-1]),
+                     dtype=np.result_type(*found) if found else complex)
+    for one, high, wide in zip(found, pairwise(rows), pairwise(columns), strict=True):
+        total[..., slice(*high), slice(*wide)] = one
     return total

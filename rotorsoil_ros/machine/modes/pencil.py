@@ -58,7 +58,8 @@ class Pencil:
     The unknowns are the rotors' coordinates in forward and backward whirl and their rates, the
     motion z of the support and its rate, the forces p on its massless compliance, and the states
     of that, z = N(w) p; beside it what bends has a stiffness K, so that p = f + (w^2 M - K) z.
-    Bearing springs are in units of their nominal ones.
+    Bearing springs are in units of their nominal ones. Nothing of the support is summed up as in
+    `SupportModes`: no step of Newton follows that would make right what grows by very little.
 
     Attributes
     ----------

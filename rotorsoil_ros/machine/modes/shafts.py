@@ -1,6 +1,6 @@
 """All shafts on the same blocks, each in few shapes and each at its own speed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -9,7 +9,7 @@ import math
 import numpy as np
 import scipy.linalg
 
-from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray
+from rotorsoil_ros.arrays import AnyArray, ComplexArray, FloatArray, IntArray, side_by_side
 from rotorsoil_ros.machine.coupled import CoupledModel
 from rotorsoil_ros.rotor.assembly import Rotor
 from rotorsoil_ros.rotor.losses import Losses, WHIRL_DIRECTIONS
@@ -262,8 +262,8 @@ class Shafts:
         """
         found = [one.whirls(speed, one.lag(frequency, lag)) for one in self.each]
         inverse = np.concatenate([one for one, _, _ in found], axis=-1)
-        return (inverse, _side_by_side([one for _, one, _ in found]),
-                _side_by_side([one for _, _, one in found]))
+        return (inverse, side_by_side([one for _, one, _ in found], len(speed), 2),
+                side_by_side([one for _, _, one in found], len(speed), 2))
 
     @cached_property
     def modes(self) -> tuple[IntArray, ...]:
@@ -312,16 +312,3 @@ class Shafts:
         """Yield deflections and slopes of each in a shape (2, r), as `ShaftLine.bent`."""
         for one, rows in zip(self.each, self.rows, strict=True):
             yield one.bent(rotor[:, rows])
-
-
-def _side_by_side(parts: Sequence[AnyArray]) -> AnyArray:
-    """Return matrices (n, 2, d, e) as blocks of larger ones that nothing couples."""
-    if len(parts) == 1:
-        return parts[0]
-    heights, widths = (np.cumsum([0, *(part.shape[axis] for part in parts)]).tolist()
-                       for axis in (2, 3))
-    total = np.zeros((*parts[0].shape[:2], heights[-1], widths[-1]),
-                     dtype=np.result_type(*parts))
-    for part, high, wide in zip(parts, pairwise(heights), pairwise(widths), strict=True):
-        total[:, :, slice(*high), slice(*wide)] = part
-    return total
